@@ -1,0 +1,98 @@
+// Pack: kLanes doubles side by side. A lane is one knot, one step length or one candidate; lanes never mix.
+//
+// All of rbd and ocp is written over a scalar S that is double or Pack, without branches on values: comparisons give masks, and
+// select(mask, a, b) picks per lane. GCC and Clang vector extensions keep this portable (AVX2, AVX-512, NEON).
+#ifndef CONTROLLER_RBD_RBD_PACK_H_
+#define CONTROLLER_RBD_RBD_PACK_H_
+
+#include <Eigen/Core>
+#include <cmath>
+#include <cstdint>
+
+namespace engram {
+
+#ifndef ENGRAM_LANES
+#define ENGRAM_LANES 4
+#endif
+inline constexpr int kLanes = ENGRAM_LANES;
+
+struct Pack {
+  typedef double Lanes __attribute__((vector_size(kLanes * sizeof(double))));
+  typedef int64_t Mask __attribute__((vector_size(kLanes * sizeof(double))));
+  Lanes l;
+
+  Pack() = default;
+  Pack(double s) : l(Lanes{} + s) {}  // NOLINT: broadcasting is meant to be implicit
+  explicit Pack(Lanes lanes) : l(lanes) {}
+  double operator[](int i) const { return l[i]; }
+  void set(int i, double s) { l[i] = s; }
+
+  Pack& operator+=(Pack b) { l += b.l; return *this; }
+  Pack& operator-=(Pack b) { l -= b.l; return *this; }
+  Pack& operator*=(Pack b) { l *= b.l; return *this; }
+  Pack& operator/=(Pack b) { l /= b.l; return *this; }
+  friend Pack operator+(Pack a, Pack b) { return Pack(a.l + b.l); }
+  friend Pack operator-(Pack a, Pack b) { return Pack(a.l - b.l); }
+  friend Pack operator*(Pack a, Pack b) { return Pack(a.l * b.l); }
+  friend Pack operator/(Pack a, Pack b) { return Pack(a.l / b.l); }
+  friend Pack operator-(Pack a) { return Pack(-a.l); }
+  friend Mask operator<(Pack a, Pack b) { return a.l < b.l; }
+  friend Mask operator>(Pack a, Pack b) { return a.l > b.l; }
+  friend Mask operator<=(Pack a, Pack b) { return a.l <= b.l; }
+  friend Mask operator>=(Pack a, Pack b) { return a.l >= b.l; }
+};
+
+// Per lane: mask ? a : b.
+inline Pack select(Pack::Mask mask, Pack a, Pack b) { return Pack(mask ? a.l : b.l); }
+inline double select(bool mask, double a, double b) { return mask ? a : b; }
+
+template <class S> inline S max(S a, S b) { return select(a > b, a, b); }
+template <class S> inline S min(S a, S b) { return select(a < b, a, b); }
+
+// Functions without a vector instruction run lane by lane.
+template <class F> inline Pack per_lane(Pack a, F f) {
+  Pack r;
+  for (int i = 0; i < kLanes; ++i) r.l[i] = f(a.l[i]);
+  return r;
+}
+inline Pack sqrt(Pack a) { return per_lane(a, [](double s) { return std::sqrt(s); }); }
+inline Pack abs(Pack a) { return select(a < Pack(0.0), -a, a); }
+inline double sqrt(double a) { return std::sqrt(a); }
+inline double abs(double a) { return std::fabs(a); }
+inline void sincos(double a, double& s, double& c) { s = std::sin(a); c = std::cos(a); }
+inline void sincos(Pack a, Pack& s, Pack& c) {
+  for (int i = 0; i < kLanes; ++i) {
+    s.l[i] = std::sin(a.l[i]);
+    c.l[i] = std::cos(a.l[i]);
+  }
+}
+inline double atan2(double y, double x) { return std::atan2(y, x); }
+inline Pack atan2(Pack y, Pack x) {
+  Pack r;
+  for (int i = 0; i < kLanes; ++i) r.l[i] = std::atan2(y.l[i], x.l[i]);
+  return r;
+}
+
+// How many values a scalar carries, and lane access that also works on double.
+template <class S> inline constexpr int lanes_of = 1;
+template <> inline constexpr int lanes_of<Pack> = kLanes;
+inline double lane(double a, int) { return a; }
+inline double lane(Pack a, int i) { return a.l[i]; }
+inline void set_lane(double& a, int, double s) { a = s; }
+inline void set_lane(Pack& a, int i, double s) { a.l[i] = s; }
+
+}  // namespace engram
+
+namespace Eigen {
+template <> struct NumTraits<engram::Pack> : GenericNumTraits<double> {
+  typedef engram::Pack Real;
+  typedef engram::Pack NonInteger;
+  typedef engram::Pack Nested;
+  typedef engram::Pack Literal;
+  enum { IsComplex = 0, IsInteger = 0, IsSigned = 1, RequireInitialization = 0, ReadCost = 1, AddCost = 1, MulCost = 1 };
+};
+template <class Op> struct ScalarBinaryOpTraits<engram::Pack, double, Op> { typedef engram::Pack ReturnType; };
+template <class Op> struct ScalarBinaryOpTraits<double, engram::Pack, Op> { typedef engram::Pack ReturnType; };
+}  // namespace Eigen
+
+#endif  // CONTROLLER_RBD_RBD_PACK_H_
