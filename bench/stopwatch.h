@@ -1,0 +1,78 @@
+// What both sides of a benchmark share: the stopwatch, the reader of input numbers, the JSON on standard output.
+//
+// Plain doubles only, so that the two executables (own build flags, never linked together) measure and report alike.
+#ifndef BENCH_STOPWATCH_H_
+#define BENCH_STOPWATCH_H_
+
+#include <chrono>
+#include <cstddef>
+#include <cstdio>
+#include <cstdlib>
+#include <fstream>
+#include <string>
+#include <vector>
+
+namespace bench {
+
+// Durations of `n` calls of f after three warm-up calls, in microseconds, divided by `batch` (the pieces of work in one call).
+template <class F>
+std::vector<double> sample_us(int n, F&& f, double batch = 1) {
+  using Clock = std::chrono::steady_clock;
+  for (int i = 0; i < 3; ++i) f();
+  std::vector<double> us(n);
+  for (double& sample : us) {
+    const Clock::time_point start = Clock::now();
+    f();
+    sample = std::chrono::duration<double, std::micro>(Clock::now() - start).count() / batch;
+  }
+  return us;
+}
+
+// Keeps a result alive without storing it.
+template <class T>
+inline void keep(const T& value) {
+  asm volatile("" : : "g"(&value) : "memory");
+}
+
+// Whitespace-separated numbers of a text file; ends the program if there are none.
+inline std::vector<double> read_numbers(const char* path) {
+  std::ifstream file(path);
+  std::vector<double> numbers;
+  for (double number; file >> number;) numbers.push_back(number);
+  if (numbers.empty()) {
+    std::fprintf(stderr, "%s: no numbers\n", path);
+    std::exit(1);
+  }
+  return numbers;
+}
+
+// One flat JSON object on standard output: name -> number or list of numbers, in order of the calls.
+class Report {
+ public:
+  Report() { std::printf("{"); }
+  ~Report() { std::printf("}\n"); }
+  Report(const Report&) = delete;
+  Report& operator=(const Report&) = delete;
+
+  void number(const char* name, double value) {
+    key(name);
+    std::printf("%.17g", value);
+  }
+  void list(const char* name, const double* values, std::size_t n) {
+    key(name);
+    std::printf("[");
+    for (std::size_t i = 0; i < n; ++i) std::printf(i ? ",%.17g" : "%.17g", values[i]);
+    std::printf("]");
+  }
+  void list(const char* name, const std::vector<double>& values) { list(name, values.data(), values.size()); }
+
+ private:
+  void key(const char* name) {
+    std::printf("%s\"%s\":", first_ ? "" : ",\n", name);
+    first_ = false;
+  }
+  bool first_ = true;
+};
+
+}  // namespace bench
+#endif  // BENCH_STOPWATCH_H_
