@@ -1,0 +1,104 @@
+"""models/<robot>/robot.toml: which URDF, what is kept of it, and what the URDF does not say."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from engram.inputs import InputError, TomlFile, closest
+from engram.paths import MODELS
+
+KEYS = ["example_robot_data", "urdf", "srdf", "free_base", "home", "armature", "gravity", "locked", "joint", "frames", "spheres"]
+JOINT_KEYS = ["armature", "q_lo", "q_hi", "v_max", "u_max"]
+
+
+@dataclass(frozen=True)
+class RobotSpec:
+    """A checked robot.toml (SI units)."""
+
+    name: str
+    file: TomlFile
+    urdf: Path
+    srdf: Path | None
+    package_dirs: list[str]
+    free_base: bool
+    home: str | dict[str, float]
+    armature: float
+    gravity: np.ndarray  # (3) m/s^2, world axes
+    locked: dict[str, float]
+    joint: dict[str, dict[str, float]]  # per joint: overrides of JOINT_KEYS
+    frames: dict[str, str]  # name in code -> frame of the URDF
+    spheres: dict[str, np.ndarray]  # link -> (n, 4): centre in link axes, radius
+
+
+def known_robots(models: Path = MODELS) -> list[str]:
+    """Names of the folders of models/ that hold a robot.toml."""
+    return sorted(path.parent.name for path in models.glob("*/robot.toml"))
+
+
+def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
+    """Read and check models/<name>/robot.toml. Raises InputError."""
+    if name not in known_robots(models):
+        raise InputError(f"unknown robot '{name}'; {closest(name, known_robots(models))}; a new one needs models/{name}/robot.toml")
+    file = TomlFile(models / name / "robot.toml")
+    data = file.data
+    file.check_keys(data, KEYS, required=["free_base", "home", "frames"])
+    if ("urdf" in data) == ("example_robot_data" in data):
+        raise file.error("urdf", "give exactly one of 'urdf' (a path) and 'example_robot_data' (a name)")
+    if not isinstance(data["free_base"], bool):
+        raise file.error("free_base", "expected true or false")
+    for joint, table in data.get("joint", {}).items():
+        file.check_keys(table, JOINT_KEYS)
+        for key, value in table.items():
+            file.numbers(key, value, ())
+    for key in ("locked", "home"):
+        if isinstance(data.get(key), dict):
+            for joint, value in data[key].items():
+                file.numbers(joint, value, ())
+    spheres = {link: file.numbers(link, rows, (-1, 4)) for link, rows in data.get("spheres", {}).items()}
+    for link, rows in spheres.items():
+        if np.any(rows[:, 3] <= 0.0):
+            raise file.error(link, "a sphere's radius (fourth number) must be positive")
+    urdf, srdf, package_dirs = _sources(file)
+    return RobotSpec(
+        name=name,
+        file=file,
+        urdf=urdf,
+        srdf=srdf,
+        package_dirs=package_dirs,
+        free_base=data["free_base"],
+        home=data["home"],
+        armature=float(file.numbers("armature", data.get("armature", 0.0), ())),
+        gravity=file.numbers("gravity", data.get("gravity", [0.0, 0.0, -9.81]), (3,)),
+        locked=dict(data.get("locked", {})),
+        joint=data.get("joint", {}),
+        frames=data["frames"],
+        spheres=spheres,
+    )
+
+
+def _sources(file: TomlFile) -> tuple[Path, Path | None, list[str]]:
+    """URDF, SRDF and mesh search path named by a robot.toml."""
+    data = file.data
+    if "urdf" in data:
+        folder = file.path.parent
+        urdf = folder / data["urdf"]
+        srdf = folder / data["srdf"] if "srdf" in data else None
+        package_dirs = [str(folder)]
+        key = "urdf"
+    else:
+        from example_robot_data.robots_loader import ROBOTS, getModelPath
+
+        key, robot = "example_robot_data", data["example_robot_data"]
+        if robot not in ROBOTS:
+            raise file.error(key, f"example-robot-data has no robot '{robot}'; {closest(robot, list(ROBOTS))}")
+        loader = ROBOTS[robot]
+        folder = Path(loader.path) / loader.urdf_subpath
+        share = Path(getModelPath(str(folder / loader.urdf_filename)))
+        urdf = share / folder / loader.urdf_filename
+        srdf = share / loader.path / loader.srdf_subpath / loader.srdf_filename if loader.srdf_filename else None
+        package_dirs = [str(share), str(share.parent), str(share.parents[1])]
+    for kind, path in (("URDF", urdf), ("SRDF", srdf)):
+        if path is not None and not path.is_file():
+            raise file.error(key, f"no {kind} at {path}; correct the path, or install the pinned packages (make setup)")
+    return urdf.resolve(), srdf, package_dirs

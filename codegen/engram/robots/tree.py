@@ -1,0 +1,286 @@
+"""The kinematic tree of a robot, in the controller's conventions, from a URDF loaded by Pinocchio.
+
+One tree feeds both outputs (constants for C++, MJCF for MuJoCo). Joint frames are turned so that +z is the joint axis:
+
+    R_turn[i]  takes joint axes to Pinocchio's axes of the same body;  R_PJ' = R_turn[P]^T R_PJ R_turn[J]
+
+so that angles, travels and velocities are Pinocchio's, and only a continuous joint differs (angle instead of cosine, sine).
+"""
+
+import hashlib
+import struct
+from dataclasses import dataclass, fields
+
+import numpy as np
+import pinocchio as pin
+
+from engram.inputs import InputError, closest
+from engram.robots.spec import RobotSpec, read_spec
+
+FREE, REVOLUTE, PRISMATIC = 0, 1, 2  # order of JointKind in controller/rbd/rbd_types.h
+NO_LIMIT = 1e8  # stands for an absent limit: finite, so that arithmetic on it stays finite
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A robot as robot.h states it; joint i moves body i (SI units). Row-major matrices."""
+
+    name: str
+    joint_name: list[str]
+    kind: np.ndarray  # (nj) FREE, REVOLUTE, PRISMATIC
+    parent: np.ndarray  # (nj) -1: world
+    iq: np.ndarray
+    iv: np.ndarray
+    nsub: np.ndarray
+    R_PJ: np.ndarray  # (nj, 3, 3)
+    p_PJ: np.ndarray  # (nj, 3)
+    mass: np.ndarray
+    com: np.ndarray  # (nj, 3)
+    inertia: np.ndarray  # (nj, 3, 3) about the com
+    armature: np.ndarray  # (nv)
+    q_lo: np.ndarray
+    q_hi: np.ndarray
+    v_max: np.ndarray
+    u_max: np.ndarray  # (nu)
+    q_home: np.ndarray
+    gravity: np.ndarray
+    frame_name: list[str]
+    frame_joint: np.ndarray
+    R_JF: np.ndarray
+    p_JF: np.ndarray
+    sphere_joint: np.ndarray
+    p_JS: np.ndarray  # (nsphere, 3)
+    sphere_radius: np.ndarray
+    R_turn: np.ndarray  # (nj, 3, 3) joint axes -> Pinocchio's axes of the same body
+    continuous: np.ndarray  # (nj) bool
+    model: pin.Model  # locked joints removed, armature and gravity set
+
+    @property
+    def nj(self) -> int:
+        return len(self.kind)
+
+    @property
+    def nq(self) -> int:
+        return len(self.q_home)
+
+    @property
+    def nv(self) -> int:
+        return len(self.v_max)
+
+    @property
+    def nu(self) -> int:
+        return len(self.u_max)
+
+    @property
+    def digest(self) -> int:
+        """64 bits of the SHA-256 of every number of robot.h, in its order."""
+        sha = hashlib.sha256()
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if field.name in ("R_turn", "continuous") or not isinstance(value, np.ndarray):
+                continue
+            sha.update(struct.pack(f"<{value.size}d", *value.astype(float).ravel()))
+        return int.from_bytes(sha.digest()[:8], "big")
+
+
+def load(name: str) -> Tree:
+    """The tree of models/<name>/robot.toml. Raises InputError."""
+    return build(read_spec(name))
+
+
+def turn_to(axis: np.ndarray) -> np.ndarray:
+    """A rotation whose third column is `axis`; a cyclic permutation, without rounding, for an axis along x, y or z."""
+    i = int(np.argmax(np.abs(axis)))
+    x = np.eye(3)[(i + 1) % 3]
+    x = x - axis * (axis @ x)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(axis, x), axis])
+
+
+def build(spec: RobotSpec) -> Tree:
+    """Load the URDF of `spec`, weld its locked joints and turn the joint frames. Raises InputError."""
+    model, home = _load_model(spec)
+    nj = model.njoints - 1
+    kind, continuous, R_turn = np.zeros(nj, int), np.zeros(nj, bool), np.zeros((nj, 3, 3))
+    for i in range(nj):
+        kind[i], continuous[i], axis = _classify(spec, model.names[i + 1], model.joints[i + 1])
+        R_turn[i] = np.eye(3) if axis is None else turn_to(axis)
+    parent = np.array(model.parents)[1:] - 1
+    R_PJ, p_PJ, com, inertia = np.zeros((nj, 3, 3)), np.zeros((nj, 3)), np.zeros((nj, 3)), np.zeros((nj, 3, 3))
+    nsub = np.ones(nj, int)
+    for i in reversed(range(nj)):
+        R_parent = np.eye(3) if parent[i] < 0 else R_turn[parent[i]]
+        placement, body = model.jointPlacements[i + 1], model.inertias[i + 1]
+        R_PJ[i] = R_parent.T @ placement.rotation @ R_turn[i]
+        p_PJ[i] = R_parent.T @ placement.translation
+        com[i] = R_turn[i].T @ body.lever
+        inertia[i] = R_turn[i].T @ body.inertia @ R_turn[i]
+        if parent[i] >= 0:
+            nsub[parent[i]] += nsub[i]
+    sizes = np.where(kind == FREE, 7, 1), np.where(kind == FREE, 6, 1)
+    iq, iv = (np.concatenate([[0], np.cumsum(n)[:-1]]) for n in sizes)
+    q_lo, q_hi = np.full(sizes[0].sum(), -NO_LIMIT), np.full(sizes[0].sum(), NO_LIMIT)
+    for i in np.flatnonzero((kind != FREE) & ~continuous).tolist():
+        q_lo[iq[i]] = model.lowerPositionLimit[model.joints[i + 1].idx_q]
+        q_hi[iq[i]] = model.upperPositionLimit[model.joints[i + 1].idx_q]
+    frames = [_frame(spec, model, R_turn, name, link) for name, link in spec.frames.items()]
+    spheres = [(_frame(spec, model, R_turn, link, link), row) for link, rows in spec.spheres.items() for row in rows]
+    tree = Tree(
+        name=spec.name,
+        joint_name=list(model.names)[1:],
+        kind=kind,
+        parent=parent,
+        iq=iq,
+        iv=iv,
+        nsub=nsub,
+        R_PJ=R_PJ,
+        p_PJ=p_PJ,
+        mass=np.array([body.mass for body in model.inertias])[1:],
+        com=com,
+        inertia=inertia,
+        armature=np.array(model.armature),
+        q_lo=np.clip(q_lo, -NO_LIMIT, NO_LIMIT),
+        q_hi=np.clip(q_hi, -NO_LIMIT, NO_LIMIT),
+        v_max=np.clip(model.velocityLimit, 0.0, NO_LIMIT),
+        u_max=np.clip(model.effortLimit[6 if spec.free_base else 0 :], 0.0, NO_LIMIT),
+        q_home=np.zeros(len(q_lo)),
+        gravity=spec.gravity,
+        frame_name=list(spec.frames),
+        frame_joint=np.array([joint for joint, _, _ in frames], int),
+        R_JF=np.array([R for _, R, _ in frames]).reshape(-1, 3, 3),
+        p_JF=np.array([p for _, _, p in frames]).reshape(-1, 3),
+        sphere_joint=np.array([joint for (joint, _, _), _ in spheres], int),
+        p_JS=np.array([p + R @ row[:3] for (_, R, p), row in spheres]).reshape(-1, 3),
+        sphere_radius=np.array([row[3] for _, row in spheres]),
+        R_turn=R_turn,
+        continuous=continuous,
+        model=model,
+    )
+    tree.q_home[:] = q_from_pin(tree, home)
+    _check(spec, tree)
+    return tree
+
+
+def q_from_pin(tree: Tree, q_pin: np.ndarray) -> np.ndarray:
+    """Pinocchio's configuration -> ours: a continuous joint's (cosine, sine) becomes its angle in (-pi, pi]."""
+    q = np.zeros(tree.nq)
+    for i, joint in enumerate(tree.model.joints[1:]):
+        part = q_pin[joint.idx_q : joint.idx_q + joint.nq]
+        q[tree.iq[i] : tree.iq[i] + (7 if tree.kind[i] == FREE else 1)] = (
+            np.arctan2(part[1], part[0]) if tree.continuous[i] else part
+        )
+    return q
+
+
+def q_to_pin(tree: Tree, q: np.ndarray) -> np.ndarray:
+    """Our configuration -> Pinocchio's."""
+    q_pin = np.zeros(tree.model.nq)
+    for i, joint in enumerate(tree.model.joints[1:]):
+        part = q[tree.iq[i] : tree.iq[i] + (7 if tree.kind[i] == FREE else 1)]
+        q_pin[joint.idx_q : joint.idx_q + joint.nq] = (
+            [np.cos(part[0]), np.sin(part[0])] if tree.continuous[i] else part
+        )
+    return q_pin
+
+
+def _load_model(spec: RobotSpec) -> tuple[pin.Model, np.ndarray]:
+    """The Pinocchio model with joints welded and overrides applied, and its nominal posture (Pinocchio's q)."""
+    root = [pin.JointModelFreeFlyer()] if spec.free_base else []
+    try:
+        model = pin.buildModelFromUrdf(str(spec.urdf), *root)
+    except (ValueError, RuntimeError) as error:
+        raise InputError(f"{spec.urdf}: Pinocchio cannot read this URDF ({error}); mend the file") from None
+    home = pin.neutral(model)
+    if isinstance(spec.home, str):
+        if spec.srdf is None:
+            raise spec.file.error("home", "a posture by name needs an SRDF; give a table joint = value instead")
+        pin.loadReferenceConfigurations(model, str(spec.srdf), False)
+        if spec.home not in model.referenceConfigurations:
+            raise spec.file.error("home", f"{spec.srdf.name} has no posture of this name")
+        home = np.array(model.referenceConfigurations[spec.home])  # a copy: the model is replaced below
+    else:
+        _put(spec, model, home, spec.home)
+    weld = home.copy()
+    _put(spec, model, weld, spec.locked)
+    model = pin.buildReducedModel(model, [model.getJointId(joint) for joint in spec.locked], weld)
+    kept = pin.neutral(model)
+    reference = pin.buildModelFromUrdf(str(spec.urdf), *root)
+    for name, joint in zip(list(model.names)[1:], model.joints[1:]):
+        full = reference.joints[reference.getJointId(name)]
+        kept[joint.idx_q : joint.idx_q + joint.nq] = home[full.idx_q : full.idx_q + full.nq]
+    _override(spec, model)
+    return model, kept
+
+
+def _joint_id(spec: RobotSpec, model: pin.Model, joint: str) -> int:
+    if not model.existJointName(joint):
+        raise spec.file.error(joint, f"{spec.urdf.name} has no such joint; {closest(joint, list(model.names)[1:])}")
+    return model.getJointId(joint)
+
+
+def _put(spec: RobotSpec, model: pin.Model, q: np.ndarray, values: dict[str, float]) -> None:
+    """Write joint values (rad, m) into Pinocchio's q."""
+    for name, value in values.items():
+        joint = model.joints[_joint_id(spec, model, name)]
+        q[joint.idx_q : joint.idx_q + joint.nq] = value if joint.nq == 1 else [np.cos(value), np.sin(value)]
+
+
+def _override(spec: RobotSpec, model: pin.Model) -> None:
+    """Gravity, armature and the limits that robot.toml states."""
+    model.gravity.linear = spec.gravity
+    base = 6 if spec.free_base else 0
+    model.armature = np.concatenate([np.zeros(base), np.full(model.nv - base, spec.armature)])
+    for name, values in spec.joint.items():
+        joint = model.joints[_joint_id(spec, model, name)]
+        for key, (array, i) in {
+            "armature": (model.armature, joint.idx_v),
+            "q_lo": (model.lowerPositionLimit, joint.idx_q),
+            "q_hi": (model.upperPositionLimit, joint.idx_q),
+            "v_max": (model.velocityLimit, joint.idx_v),
+            "u_max": (model.effortLimit, joint.idx_v),
+        }.items():
+            array[i] = values.get(key, array[i])
+
+
+def _classify(spec: RobotSpec, name: str, joint: pin.JointModel) -> tuple[int, bool, np.ndarray | None]:
+    """Kind, whether continuous, and axis in Pinocchio's joint frame (None: free)."""
+    short = joint.shortname()
+    if short == "JointModelFreeFlyer":
+        return FREE, False, None
+    for kind, continuous, prefix in ((REVOLUTE, False, "R"), (REVOLUTE, True, "RUB"), (PRISMATIC, False, "P")):
+        if short in (f"JointModel{prefix}{letter}" for letter in "XYZ"):
+            return kind, continuous, np.eye(3)["XYZ".index(short[-1])]
+    for kind, continuous, long in (
+        (REVOLUTE, False, "JointModelRevoluteUnaligned"),
+        (REVOLUTE, True, "JointModelRevoluteUnboundedUnaligned"),
+        (PRISMATIC, False, "JointModelPrismaticUnaligned"),
+    ):
+        if short == long:
+            return kind, continuous, np.array(joint.extract().axis)
+    raise spec.file.error(name, f"joint '{name}' is a {short}; only free-flyer base, revolute, continuous and prismatic joints are known")
+
+
+def _frame(spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link: str) -> tuple[int, np.ndarray, np.ndarray]:
+    """Joint that carries a frame of the URDF, and R_JF, p_JF in turned joint axes."""
+    if not model.existFrame(link):
+        known = [frame.name for frame in model.frames]
+        raise spec.file.error(key, f"{spec.urdf.name} has no frame '{link}'; {closest(link, known)}")
+    frame = model.frames[model.getFrameId(link)]
+    if frame.parentJoint == 0:
+        raise spec.file.error(key, f"frame '{link}' does not move; name one on a moving body")
+    joint = frame.parentJoint - 1
+    return joint, R_turn[joint].T @ frame.placement.rotation, R_turn[joint].T @ frame.placement.translation
+
+
+def _check(spec: RobotSpec, tree: Tree) -> None:
+    """Refuse trees that the controller or MuJoCo could not simulate."""
+    for i, name in enumerate(tree.joint_name):
+        q, lo, hi = (a[tree.iq[i]] for a in (tree.q_home, tree.q_lo, tree.q_hi))
+        if tree.parent[i] >= i or (tree.parent[i] >= 0 and i >= tree.parent[i] + tree.nsub[tree.parent[i]]):
+            raise spec.file.error(name, f"joint '{name}' is not in depth-first order")
+        if tree.mass[i] <= 0.0 or np.linalg.eigvalsh(tree.inertia[i])[0] <= 0.0:
+            raise spec.file.error(name, f"the body moved by joint '{name}' has no mass or no inertia; lock the joint or mend the URDF")
+        if lo >= hi:
+            raise spec.file.error(name, f"joint '{name}': lower limit {lo:g} is not below upper limit {hi:g}")
+        if not lo <= q <= hi:
+            raise spec.file.error(name, f"joint '{name}': nominal posture {q:g} is outside its limits [{lo:g}, {hi:g}]")
