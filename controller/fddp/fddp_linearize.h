@@ -1,0 +1,96 @@
+// Step 1 of an iteration: the linear-quadratic model of every knot at (xs, us), kLanes knots at a time, and the gaps.
+#ifndef CONTROLLER_FDDP_FDDP_LINEARIZE_H_
+#define CONTROLLER_FDDP_FDDP_LINEARIZE_H_
+
+#include "controller/fddp/fddp.h"
+
+#include <cmath>
+
+namespace engram {
+
+// Lanes of knots first, first + 1, ...; beyond last the last knot is repeated.
+struct KnotLanes {
+  int index[kLanes];
+  KnotLanes(int first, int last) {
+    for (int i = 0; i < kLanes; ++i) index[i] = first + i < last ? first + i : last;
+  }
+};
+
+// n doubles of each of kLanes records -> n packs.
+template <class Record> inline void gather(const Record* records, const KnotLanes& knots, int n, Pack* out) {
+  const double* from[kLanes];
+  for (int i = 0; i < kLanes; ++i) from[i] = reinterpret_cast<const double*>(&records[knots.index[i]]);
+  for (int e = 0; e < n; ++e)
+    for (int i = 0; i < kLanes; ++i) out[e].l[i] = from[i][e];
+}
+
+// n packs -> n doubles of each of the lanes' records.
+inline void scatter(const Pack* in, int n, double* const* to) {
+  for (int e = 0; e < n; ++e)
+    for (int i = 0; i < kLanes; ++i) to[i][e] = in[e].l[i];
+}
+
+template <class P, int N> void fddp_scatter_models(FddpWork<P, N>& w, const KnotLanes& knots) {
+  using L = typename P::Layout;
+  double* to[kLanes];
+  const auto block = [&](auto member, const Pack* in, int n) {
+    for (int i = 0; i < kLanes; ++i) to[i] = member(w.model[knots.index[i]]);
+    scatter(in, n, to);
+  };
+  block([](auto& m) { return &m.D[0][0]; }, &w.lanes.D[0][0], P::nv * L::nzp);
+  block([](auto& m) { return m.Lz; }, w.lanes.Lz, L::nzp);
+  for (int r = 0; r < L::nzp; ++r) block([r](auto& m) { return m.Lzz[r]; }, w.lanes.Lzz[r], padded(r + 1));
+  if constexpr (P::kFreeBase) {
+    block([](auto& m) { return &m.E[0][0]; }, &w.lanes.E[0][0], 36);
+    block([](auto& m) { return &m.G[0][0]; }, &w.lanes.G[0][0], 36);
+  }
+}
+
+// Fills w.model, w.f, w.gap and w.cost. False if a cost or a gap is not finite.
+template <class P, int N> bool fddp_linearize(const Horizon<P, N>& h, const FddpSolution<P, N>& s, FddpWork<P, N>& w) {
+  using L = typename P::Layout;
+  constexpr int knot_size = sizeof(typename P::template Knot<double>) / sizeof(double);
+  typename P::template Knot<Pack> knot;
+  static_assert(sizeof(knot) == knot_size * sizeof(Pack), "a Knot holds scalars only");
+  Pack x[P::nx], u[P::nu], x_next[P::nx], x_there[P::nx], cost, f[L::nxp];
+
+  w.cost = 0.0;
+  for (int k = 0; k <= h.n; k += kLanes) {
+    const KnotLanes here(k, h.n), there(k + 1, h.n);
+    gather(h.knot, here, knot_size, reinterpret_cast<Pack*>(&knot));
+    gather(s.x, here, P::nx, x);
+    gather(s.u, KnotLanes(k, h.n > 0 ? h.n - 1 : 0), P::nu, u);
+    if (k + kLanes > h.n)  // the terminal knot has no control
+      for (int i = 0; i < P::nu; ++i)
+        for (int j = 0; j < kLanes; ++j)
+          if (here.index[j] == h.n) u[i].l[j] = 0.0;
+    P::linearize(knot, x, u, x_next, cost, w.lanes);
+    fddp_scatter_models(w, here);
+    for (int i = 0; i < kLanes && k + i <= h.n; ++i) w.cost += cost.l[i];
+
+    if (!w.feasible) {  // f_{k+1} = f(x_k, u_k) (-) x_{k+1}
+      gather(s.x, there, P::nx, x_there);
+      P::difference(x_there, x_next, f);
+      for (int i = 0; i < kLanes && k + i < h.n; ++i)
+        for (int e = 0; e < L::nxp; ++e) w.f[k + i + 1][e] = f[e].l[i];
+    }
+  }
+  if (!w.feasible) P::difference(s.x[0], h.x0, w.f[0]);
+  else
+    for (int k = 0; k <= h.n; ++k)
+      for (int e = 0; e < L::nxp; ++e) w.f[k][e] = 0.0;
+
+  double largest = 0.0;
+  w.gap = 0.0;
+  for (int k = 0; k <= h.n; ++k)
+    for (int e = 0; e < L::nxp; ++e) {
+      const double a = std::fabs(w.f[k][e]);
+      w.gap += a;
+      largest = a > largest ? a : largest;
+    }
+  w.largest_gap = largest;
+  return std::isfinite(w.cost) && std::isfinite(w.gap);
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_FDDP_FDDP_LINEARIZE_H_

@@ -1,0 +1,54 @@
+// The linear-quadratic model of one knot, and the layout that the solver sweeps.
+//
+//   dv' = D dz                       z = (q, v, u) in the tangent space
+//   dq' = E dq + dt G dv'            E = G = I except in the 6x6 block of a free base
+//   l   ~ l0 + Lz' dz + 1/2 dz' Lzz dz
+//
+// This is all that a semi-implicit step leaves to know: the dense Fx is never formed. Each block q, v, u starts at a multiple of
+// the vector width, so that kernels load aligned and need no remainders; what pads a block stays zero.
+#ifndef CONTROLLER_OCP_OCP_KNOT_MODEL_H_
+#define CONTROLLER_OCP_OCP_KNOT_MODEL_H_
+
+#include "controller/rbd/rbd_types.h"
+
+#include <cstddef>
+
+namespace engram {
+
+#ifdef __AVX512F__
+inline constexpr int kVector = 8;  // doubles in a register of the dense kernels
+#else
+inline constexpr int kVector = 4;
+#endif
+constexpr int padded(int n) { return (n + kVector - 1) / kVector * kVector; }
+
+// Sizes and offsets of z = (q, v, u) for nv velocities and nu controls.
+template <int nv_, int nu_> struct KnotLayout {
+  static constexpr int nv = nv_, nu = nu_, ndx = 2 * nv_;
+  static constexpr int oq = 0, ov = padded(nv), ou = 2 * padded(nv);  // first entry of each block
+  static constexpr int nxp = 2 * padded(nv);                          // padded size of dx = (dq, dv)
+  static constexpr int nup = padded(nu);
+  static constexpr int nzp = nxp + nup;                               // padded size of dz
+};
+
+// The base block of the integrator; nothing for a fixed base.
+template <bool free_base, class S> struct BaseBlock {};
+template <class S> struct BaseBlock<true, S> {
+  alignas(64) S E[6][6];  // d q' / d q         (6 x 6)
+  alignas(64) S G[6][6];  // d q' / d (dt v')   (6 x 6)
+};
+
+// S = double: one knot. S = Pack: kLanes knots side by side, element by element in the same order.
+template <class Layout, bool free_base, class S> struct KnotModel : BaseBlock<free_base, S> {
+  alignas(64) S D[Layout::nv][Layout::nzp];     // d v' / d z                                  (nv x nz)
+  alignas(64) S Lz[Layout::nzp];                // d l / d z                                   (nz)
+  alignas(64) S Lzz[Layout::nzp][Layout::nzp];  // Gauss-Newton Hessian, lower triangle        (nz x nz)
+};
+
+// Where coordinate i of dz = (dq, dv, du) stands in a padded vector.
+template <class Layout> constexpr int padded_index(int i) {
+  return i < Layout::nv ? i : i < Layout::ndx ? Layout::ov + i - Layout::nv : Layout::ou + i - Layout::ndx;
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_OCP_OCP_KNOT_MODEL_H_

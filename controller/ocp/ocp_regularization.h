@@ -1,0 +1,101 @@
+// Regularization terms: state about a reference, torque about zero or about gravity.
+#ifndef CONTROLLER_OCP_OCP_REGULARIZATION_H_
+#define CONTROLLER_OCP_OCP_REGULARIZATION_H_
+
+#include "controller/ocp/ocp_view.h"
+#include "controller/rbd/rbd_manifold.h"
+
+namespace engram {
+
+// 1/2 sum_i w_i (x (-) x_ref)_i^2
+template <class R> struct StateTerm {
+  static constexpr bool kNeedsGravity = false;
+  template <class S> struct Param {
+    S state_w[2 * R::nv];            // weights of dq [1/rad^2 or 1/m^2], dv
+    S state_ref[R::nq + R::nv];      // x_ref = (q, v)
+  };
+  template <class S> static S cost(const Param<S>& p, const KnotView<R, S>& k) {
+    S r[2 * R::nv], c = 0.0;
+    residual(p, k, r);
+    for (int i = 0; i < 2 * R::nv; ++i) c += p.state_w[i] * r[i] * r[i];
+    return S(0.5) * c;
+  }
+  template <class S> static S expand(const Param<S>& p, const KnotView<R, S>& k, ModelOf<R, S>& M) {
+    using L = LayoutOf<R>;
+    S r[2 * R::nv], c = 0.0;
+    residual(p, k, r);
+    constexpr int base = kFreeBase<R> ? 6 : 0;
+    for (int i = 0; i < 2 * R::nv; ++i) {
+      const S wr = p.state_w[i] * r[i];
+      c += wr * r[i];
+      if (i < base) continue;
+      const int z = padded_index<L>(i);
+      M.Lz[z] += wr;
+      M.Lzz[z][z] += p.state_w[i];
+    }
+    if constexpr (base > 0) {  // d (q (-) q_ref) / d q = Jlog6 in the base block
+      S J[6][6], rb[6], w[6];
+      rbd_difference_jacobian<R>(p.state_ref, k.q, J);
+      for (int i = 0; i < 6; ++i) {
+        rb[i] = r[i];
+        w[i] = p.state_w[i];
+      }
+      constexpr int dofs[6] = {0, 1, 2, 3, 4, 5};
+      add_gauss_newton(J, dofs, 6, rb, w, M);
+    }
+    return S(0.5) * c;
+  }
+
+ private:
+  template <class S> static void residual(const Param<S>& p, const KnotView<R, S>& k, S* r) {
+    rbd_difference<R>(p.state_ref, k.q, r);
+    for (int i = 0; i < R::nv; ++i) r[R::nv + i] = k.v[i] - p.state_ref[R::nq + i];
+  }
+};
+
+// 1/2 w |u|^2, or 1/2 w |u - g(q)|^2 about the gravity torque.
+template <class R, bool about_gravity> struct ControlTerm {
+  static constexpr bool kNeedsGravity = about_gravity;
+  static constexpr int first = R::nv - R::nu;  // first actuated dof
+  template <class S> struct Param {
+    S control_w;  // [1/(N m)^2]
+  };
+  template <class S> static S cost(const Param<S>& p, const KnotView<R, S>& k) {
+    S c = 0.0;
+    for (int i = 0; i < R::nu; ++i) {
+      const S r = residual(k, i);
+      c += r * r;
+    }
+    return S(0.5) * p.control_w * c;
+  }
+  template <class S> static S expand(const Param<S>& p, const KnotView<R, S>& k, ModelOf<R, S>& M) {
+    using L = LayoutOf<R>;
+    const S w = p.control_w;
+    S c = 0.0;
+    for (int i = 0; i < R::nu; ++i) {
+      const S r = residual(k, i), wr = w * r;
+      c += r * r;
+      M.Lz[L::ou + i] += wr;
+      M.Lzz[L::ou + i][L::ou + i] += w;
+      if constexpr (about_gravity) {  // d r / d q = -dg/dq
+        const S* const dg = k.dg_dq[first + i];
+        for (int a = 0; a < R::nv; ++a) {
+          const S wJ = w * dg[a];
+          M.Lz[a] -= wr * dg[a];
+          M.Lzz[L::ou + i][a] -= wJ;
+          for (int b = 0; b <= a; ++b) M.Lzz[a][b] += wJ * dg[b];
+        }
+      }
+    }
+    return S(0.5) * w * c;
+  }
+
+ private:
+  template <class S> static S residual(const KnotView<R, S>& k, int i) {
+    if constexpr (about_gravity) return k.u[i] - k.g[first + i];
+    else return k.u[i];
+  }
+};
+
+}  // namespace engram
+#endif  // CONTROLLER_OCP_OCP_REGULARIZATION_H_
