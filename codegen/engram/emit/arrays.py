@@ -1,0 +1,82 @@
+"""Arrays as the evaluators read them: float32, padded to whole vectors, and their digest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SCHEMA = 1  # TAB_SCHEMA of controller/tab/tab.h
+LANES = 8  # TAB_LANES
+FAR = 1e15  # TAB_FAR
+
+FNV_OFFSET = 0xCBF29CE484222325
+FNV_PRIME = 0x100000001B3
+MASK64 = (1 << 64) - 1
+
+
+def pad(n: int) -> int:
+    """n rounded up to whole vectors (tab_pad)."""
+    return -(-n // LANES) * LANES
+
+
+@dataclass(frozen=True)
+class Array:
+    """One array of a table: name, one line about its shape, and float32 rows (2-D: a row is a line of text)."""
+
+    name: str
+    about: str
+    rows: np.ndarray
+
+    @property
+    def flat(self) -> np.ndarray:
+        """All numbers in the order of memory."""
+        return self.rows.reshape(-1)
+
+
+def array(name: str, about: str, values: np.ndarray) -> Array:
+    """`values` as float32 rows; refuses what is not finite, and flushes denormals, which would slow the evaluator down."""
+    wide = np.atleast_2d(np.asarray(values, dtype=np.float64))
+    with np.errstate(over="ignore"):
+        rows = wide.astype(np.float32)
+    if not np.all(np.isfinite(rows)):
+        raise ValueError(f"array '{name}' holds numbers that are not finite as float32")
+    rows[np.abs(rows) < np.finfo(np.float32).tiny] = 0.0
+    return Array(name, about, np.ascontiguousarray(rows))
+
+
+def padded_rows(values: np.ndarray) -> np.ndarray:
+    """(n, m) -> (n, pad(m)), zeros to the right."""
+    values = np.atleast_2d(values)
+    return np.pad(values, ((0, 0), (0, pad(values.shape[1]) - values.shape[1])))
+
+
+def blocks(samples: np.ndarray) -> np.ndarray:
+    """(n, d) -> (pad(n) / 8 * d, 8): eight samples side by side, input by input; padding samples lie at FAR."""
+    n, d = samples.shape
+    full = np.full((pad(n), d), FAR)
+    full[:n] = samples
+    return full.reshape(-1, LANES, d).transpose(0, 2, 1).reshape(-1, LANES)
+
+
+def unblocks(rows: np.ndarray, n: int, d: int) -> np.ndarray:
+    """The inverse of `blocks`."""
+    return rows.reshape(-1, d, LANES).transpose(0, 2, 1).reshape(-1, d)[:n]
+
+
+def triangle(lower: np.ndarray) -> np.ndarray:
+    """The lower triangle row by row, row i padded with zeros to pad(i + 1); a vector."""
+    n = len(lower)
+    square = np.pad(np.tril(lower), ((0, 0), (0, pad(n) - n)))
+    return np.concatenate([square[i, : pad(i + 1)] for i in range(n)])
+
+
+def digest(arrays: list[Array]) -> int:
+    """FNV-1a over counts and floats as 32-bit words: tab_digest of controller/tab/tab.h."""
+    value = FNV_OFFSET
+    for item in arrays:
+        count = item.flat.size
+        words = [count & 0xFFFFFFFF, count >> 32, *item.flat.view(np.uint32).tolist()]
+        for word in words:
+            value = ((value ^ word) * FNV_PRIME) & MASK64
+    return value

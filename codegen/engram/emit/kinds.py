@@ -1,0 +1,174 @@
+"""The kinds of tables, as the learners hand them over; each knows its C struct. Mirrors controller/tab/tab_<kind>.h."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from engram.emit.arrays import Array, array, blocks, pad, padded_rows, triangle
+
+
+@dataclass(kw_only=True)
+class Table:
+    """What all kinds have in common (TabHead). `lo`, `hi`: domain; `inputs`: (name, unit) per input."""
+
+    inputs: list[tuple[str, str]]
+    lo: np.ndarray
+    hi: np.ndarray
+    held_out_error: float
+    held_out_text: str
+    kind: str = field(init=False, default="")  # file and symbol suffix; TabKnn for "knn"
+    constant: str = field(init=False, default="")  # its TabKind
+
+    @property
+    def outputs(self) -> int:
+        """Number of outputs (nout)."""
+        raise NotImplementedError
+
+    def fields(self) -> dict[str, int | np.float32]:
+        """Scalars of the C struct, in its order."""
+        raise NotImplementedError
+
+    def own_arrays(self) -> list[Array]:
+        """Arrays of the C struct, in its order."""
+        raise NotImplementedError
+
+    def arrays(self) -> list[Array]:
+        """All arrays, domain first: the order of TabHead.array."""
+        for name, bound in (("lo", self.lo), ("hi", self.hi)):
+            if np.shape(bound) != (len(self.inputs),):
+                raise ValueError(f"{self.kind}: '{name}' has shape {np.shape(bound)}, there are {len(self.inputs)} inputs")
+        domain = [array("lo", "domain, lower bound of each input", self.lo), array("hi", "domain, upper bound", self.hi)]
+        return domain + self.own_arrays()
+
+
+@dataclass(kw_only=True)
+class Knn(Table):
+    """k nearest neighbours. x (n, d) natural units, scale (d,), value (n, m)."""
+
+    x: np.ndarray
+    scale: np.ndarray
+    value: np.ndarray
+
+    def __post_init__(self) -> None:
+        self.kind, self.constant = "knn", "kTabKnn"
+
+    @property
+    def outputs(self) -> int:
+        return self.value.shape[1]
+
+    def fields(self) -> dict[str, int | np.float32]:
+        return {"n": self.x.shape[0], "d": self.x.shape[1], "m": self.outputs}
+
+    def own_arrays(self) -> list[Array]:
+        scale = array("scale", "weight of each input", self.scale)
+        # scaled in float32 exactly as the query is, so that a stored sample finds itself at distance 0
+        scaled = np.asarray(self.x, np.float32) * scale.flat
+        return [
+            scale,
+            array("x", "scaled inputs, blocks of (d, 8 samples)", blocks(scaled)),
+            array("value", "(n, pad(m)) what a sample remembers", padded_rows(self.value)),
+        ]
+
+
+@dataclass(kw_only=True)
+class Gpr(Table):
+    """Gaussian process. x (n, d), length (d,), alpha (n, m), mean (m,), linv (n, n) lower; kernel variance and noise."""
+
+    x: np.ndarray
+    length: np.ndarray
+    variance: float
+    noise: float
+    alpha: np.ndarray
+    mean: np.ndarray
+    linv: np.ndarray
+
+    def __post_init__(self) -> None:
+        self.kind, self.constant = "gpr", "kTabGpr"
+
+    @property
+    def outputs(self) -> int:
+        return self.alpha.shape[1]
+
+    def fields(self) -> dict[str, int | np.float32]:
+        n, d = self.x.shape
+        return {"n": n, "d": d, "m": self.outputs, "variance": np.float32(self.variance), "noise": np.float32(self.noise)}
+
+    def own_arrays(self) -> list[Array]:
+        inverse = array("inv_length", "1 / length scale of each input", 1.0 / self.length)
+        scaled = np.asarray(self.x, np.float32) * inverse.flat
+        return [
+            inverse,
+            array("x", "scaled inputs, blocks of (d, 8 samples)", blocks(scaled)),
+            array("alpha", "(n, pad(m)) weights of the mean", padded_rows(self.alpha)),
+            array("mean", "(pad(m)) prior mean", padded_rows(self.mean)),
+            array("linv", "lower triangle of the inverse Cholesky factor, row i padded to pad(i + 1)", triangle(self.linv)),
+        ]
+
+
+@dataclass(kw_only=True)
+class Pca(Table):
+    """PCA decoder: y = mean + basis' z. basis (m, n), mean (n,)."""
+
+    mean: np.ndarray
+    basis: np.ndarray
+
+    def __post_init__(self) -> None:
+        self.kind, self.constant = "pca", "kTabPca"
+
+    @property
+    def outputs(self) -> int:
+        return self.basis.shape[1]
+
+    def fields(self) -> dict[str, int | np.float32]:
+        return {"m": self.basis.shape[0], "n": self.outputs}
+
+    def own_arrays(self) -> list[Array]:
+        return [
+            array("mean", "(pad(n))", padded_rows(self.mean)),
+            array("basis", "(m, pad(n)) components", padded_rows(self.basis)),
+        ]
+
+
+@dataclass(kw_only=True)
+class Rbf(Table):
+    """Normalised Gaussians over time. center (k,) [s], width [s], number of channels."""
+
+    center: np.ndarray
+    width: float
+    channels: int
+
+    def __post_init__(self) -> None:
+        self.kind, self.constant = "rbf", "kTabRbf"
+
+    @property
+    def outputs(self) -> int:
+        return self.channels
+
+    def fields(self) -> dict[str, int | np.float32]:
+        return {"k": len(self.center), "nchannel": self.channels, "width": np.float32(self.width)}
+
+    def own_arrays(self) -> list[Array]:
+        return [array("center", "(pad(k)) centres [s]", np.pad(self.center, (0, pad(len(self.center)) - len(self.center))))]
+
+
+@dataclass(kw_only=True)
+class Logit(Table):
+    """Logistic regression. weight (d,), bias."""
+
+    weight: np.ndarray
+    bias: float
+
+    def __post_init__(self) -> None:
+        self.kind, self.constant = "logit", "kTabLogit"
+
+    @property
+    def outputs(self) -> int:
+        return 1
+
+    def fields(self) -> dict[str, int | np.float32]:
+        return {"d": len(self.weight), "bias": np.float32(self.bias)}
+
+    def own_arrays(self) -> list[Array]:
+        return [array("weight", "(d) per unit of the input", self.weight)]

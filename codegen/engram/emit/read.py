@@ -1,0 +1,103 @@
+"""Tables back from files: the same arrays that the controller links, for `engram table` and tests."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from engram.emit.arrays import Array, digest
+from engram.inputs import InputError, read_text
+from engram.paths import relative
+
+MEND = "run 'make tables'"
+ARRAY = re.compile(r"static const float \w+_v\d+_(\w+)\[(\d+)\] = \{\n(.*?),\n\};", re.DOTALL)
+BLOB = re.compile(r"extern const float (\w+_v\d+_(\w+))\[(\d+)\]")
+
+
+@dataclass
+class TableFile:
+    """One generated table as found on disk."""
+
+    name: str
+    kind: str
+    digest: int  # as written in the C file
+    robot_digest: int
+    task_digest: int
+    arrays: list[Array]
+    entry: dict  # its entry of the manifest
+
+    @property
+    def data_digest(self) -> int:
+        """Digest of the arrays that were read."""
+        return digest(self.arrays)
+
+
+def read_manifest(folder: Path) -> dict:
+    """MANIFEST.json of a table folder."""
+    path = folder / "MANIFEST.json"
+    text = read_text(path, MEND)
+    try:
+        return json.loads(text)
+    except json.JSONDecodeError as error:
+        raise InputError(f"{relative(path)}: not valid JSON ({error}); {MEND}") from None
+
+
+def read_table(folder: Path, entry: dict) -> TableFile:
+    """The table of one manifest entry."""
+    path = folder / f"{entry['name']}.c"
+    source = read_text(path, MEND)
+
+    def number(key: str) -> int:
+        found = re.search(rf"\.{key} = 0x([0-9a-f]+)u", source)
+        if not found:
+            raise InputError(f"{relative(path)}: field '.{key}' is missing; {MEND}")
+        return int(found.group(1), 16)
+
+    values: dict[str, np.ndarray] = {}
+    for name, count, body in ARRAY.findall(source):
+        numbers = [float.fromhex(word.rstrip("f")) for word in body.replace(",", " ").split()]
+        values[name] = np.array(numbers, dtype=np.float32)
+        if len(numbers) != int(count):
+            raise InputError(f"{relative(path)}: array '{name}' holds {len(numbers)} numbers, not {count}; {MEND}")
+    for stem, name, count in BLOB.findall(source):
+        blob = folder / f"{stem}.bin"
+        if not blob.is_file() or blob.stat().st_size != 4 * int(count):
+            raise InputError(f"{relative(blob)}: missing or not {4 * int(count)} bytes long; {MEND}")
+        values[name] = np.fromfile(blob, dtype="<f4")
+    order = re.findall(r'^ +\{"(\w+)", \w+, \d+\},$', source, re.MULTILINE)
+    if sorted(order) != sorted(values):
+        raise InputError(f"{relative(path)}: its list of arrays does not match its arrays; {MEND}")
+    arrays = [Array(name, "", values[name].reshape(1, -1)) for name in order]
+    return TableFile(
+        entry["name"], entry["kind"], number("digest"), number("robot_digest"), number("task_digest"), arrays, entry
+    )
+
+
+def read_folder(folder: Path) -> tuple[dict, list[TableFile]]:
+    """Manifest and tables of a folder; raises InputError where a file is missing or cannot be read."""
+    manifest = read_manifest(folder)
+    return manifest, [read_table(folder, entry) for entry in manifest["tables"]]
+
+
+def faults(folder: Path) -> list[str]:
+    """What is wrong with a table folder, one sentence each: files against the manifest, data against their digests."""
+    manifest, tables = read_folder(folder)
+    found = []
+    for name, facts in manifest["files"].items():
+        path = folder / name
+        if not path.is_file():
+            found.append(f"{relative(path)} is missing")
+        elif hashlib.sha256(path.read_bytes()).hexdigest() != facts["sha256"]:
+            found.append(f"{relative(path)} differs from the manifest")
+    for table in tables:
+        if table.data_digest != table.digest:
+            found.append(f"{table.name}: the data's digest is 0x{table.data_digest:016x}, expected 0x{table.digest:016x}")
+        for key, value in (("robot_digest", table.robot_digest), ("task_digest", table.task_digest)):
+            if f"0x{value:016x}" != manifest[key]:
+                found.append(f"{table.name}: {key} is 0x{value:016x}, the manifest says {manifest[key]}")
+    return found

@@ -1,0 +1,1 @@
+"""Learning: solved optimal control problems -> compact trajectories, neighbours, regressors and their trust."""

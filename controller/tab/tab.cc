@@ -1,0 +1,147 @@
+#include "controller/tab/tab.h"
+
+#include "controller/tab/tab_gpr.h"
+#include "controller/tab/tab_knn.h"
+#include "controller/tab/tab_logit.h"
+#include "controller/tab/tab_pca.h"
+#include "controller/tab/tab_rbf.h"
+
+#include <cmath>
+#include <cstring>
+
+namespace {
+
+// Text without stdio: appends to a buffer of TAB_TEXT bytes and cuts what does not fit.
+struct Text {
+  char* p;
+  int n = 0;
+  Text& operator<<(const char* s) {
+    while (s && *s && n < TAB_TEXT - 1) p[n++] = *s++;
+    p[n] = 0;
+    return *this;
+  }
+  Text& operator<<(uint64_t h) {
+    char hex[19] = "0x";
+    for (int i = 0; i < 16; ++i) hex[2 + i] = "0123456789abcdef"[(h >> (60 - 4 * i)) & 15];
+    return *this << hex;
+  }
+};
+
+// Do the array counts fit the kind's own sizes?
+bool sizes_fit(const TabHead& h) {
+  const auto count = [&h](int i) { return i < h.narray ? static_cast<int64_t>(h.array[i].count) : -1; };
+  if (h.nin < 1 || h.nin > TAB_MAX_IN || h.nout < 1 || h.narray > TAB_ARRAYS || count(0) != h.nin || count(1) != h.nin) return false;
+  for (int i = 0; i < h.narray; ++i)
+    if (!h.array[i].data) return false;
+  switch (h.kind) {
+    case kTabKnn: {
+      const TabKnn& t = reinterpret_cast<const TabKnn&>(h);
+      return t.n > 0 && t.d == h.nin && t.m == h.nout && count(2) == t.d && count(3) == int64_t{tab_pad(t.n)} * t.d &&
+             count(4) == int64_t{t.n} * tab_pad(t.m);
+    }
+    case kTabGpr: {
+      const TabGpr& t = reinterpret_cast<const TabGpr&>(h);
+      return t.n > 0 && t.n <= TAB_GPR_MAX_N && t.d == h.nin && t.m == h.nout && count(2) == t.d &&
+             count(3) == int64_t{tab_pad(t.n)} * t.d && count(4) == int64_t{t.n} * tab_pad(t.m) && count(5) == tab_pad(t.m) &&
+             count(6) == tab_gpr_linv_size(t.n);
+    }
+    case kTabPca: {
+      const TabPca& t = reinterpret_cast<const TabPca&>(h);
+      return t.m == h.nin && t.n == h.nout && count(2) == tab_pad(t.n) && count(3) == int64_t{t.m} * tab_pad(t.n);
+    }
+    case kTabRbf: {
+      const TabRbf& t = reinterpret_cast<const TabRbf&>(h);
+      return h.nin == 1 && t.k > 0 && t.k <= TAB_RBF_MAX_K && t.nchannel == h.nout && t.width > 0 && count(2) == tab_pad(t.k);
+    }
+    case kTabLogit: {
+      const TabLogit& t = reinterpret_cast<const TabLogit&>(h);
+      return t.d == h.nin && h.nout == 1 && count(2) == t.d;
+    }
+    default: return false;
+  }
+}
+
+uint64_t fnv1a(uint64_t hash, uint32_t word) { return (hash ^ word) * 0x100000001b3u; }
+
+}  // namespace
+
+extern "C" {
+
+uint64_t tab_digest(const TabHead* head) {
+  uint64_t hash = 0xcbf29ce484222325u;
+  for (int i = 0; i < head->narray; ++i) {
+    const TabArray& a = head->array[i];
+    hash = fnv1a(fnv1a(hash, static_cast<uint32_t>(a.count)), static_cast<uint32_t>(a.count >> 32));
+    for (uint64_t j = 0; j < a.count; ++j) {
+      uint32_t word;
+      std::memcpy(&word, a.data + j, sizeof word);
+      hash = fnv1a(hash, word);
+    }
+  }
+  return hash;
+}
+
+TabStatus tab_check(const TabHead* head, TabKind kind, uint64_t robot_digest, uint64_t task_digest, char* text) {
+  Text out{text};
+  out << "";
+  if (!head) {
+    out << "no " << tab_kind_text(kind) << " table was given; run 'make tables' and link its library";
+    return kTabBad;
+  }
+  out << tab_kind_text(kind) << " table '" << (head->name ? head->name : "?") << "' ";
+  const int begin = out.n;
+  if (head->schema != TAB_SCHEMA) {
+    out << "has schema " << uint64_t{head->schema} << ", this controller reads " << uint64_t{TAB_SCHEMA};
+  } else if (head->kind != static_cast<uint32_t>(kind)) {
+    out << "is of another kind: " << tab_kind_text(head->kind);
+  } else if (robot_digest && head->robot_digest != robot_digest) {
+    out << "was made for another robot: its digest is " << head->robot_digest << ", expected " << robot_digest;
+  } else if (task_digest && head->task_digest != task_digest) {
+    out << "was made for another task: its digest is " << head->task_digest << ", expected " << task_digest;
+  } else if (!sizes_fit(*head)) {
+    out << "has array sizes that contradict each other";
+  } else if (const uint64_t digest = tab_digest(head); digest != head->digest) {
+    out << "is damaged: the data's digest is " << digest << ", expected " << head->digest;
+  }
+  if (out.n > begin) {
+    out << "; run 'make tables' and build again";
+    return kTabBad;
+  }
+  text[0] = 0;
+  return kTabOk;
+}
+
+TabStatus tab_domain(const TabHead* head, const double* x) {
+  const float* lo = head->array[0].data;
+  const float* hi = head->array[1].data;
+  TabStatus status = kTabOk;
+  for (int i = 0; i < head->nin; ++i) {
+    // as a float the query may overflow where the double does not
+    if (!std::isfinite(static_cast<float>(x[i]))) return kTabNotFinite;
+    if (x[i] < lo[i] || x[i] > hi[i]) status = kTabOutside;
+  }
+  return status;
+}
+
+const char* tab_kind_text(uint32_t kind) {
+  switch (kind) {
+    case kTabKnn: return "k-NN";
+    case kTabGpr: return "GPR";
+    case kTabPca: return "PCA";
+    case kTabRbf: return "RBF";
+    case kTabLogit: return "logit";
+  }
+  return "unknown";
+}
+
+const char* tab_status_text(TabStatus status) {
+  switch (status) {
+    case kTabOk: return "ok";
+    case kTabOutside: return "outside the table's domain";
+    case kTabNotFinite: return "input not finite";
+    case kTabBad: return "bad table";
+  }
+  return "unknown";
+}
+
+}  // extern "C"

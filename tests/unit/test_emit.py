@@ -1,0 +1,124 @@
+"""Writing tables: same bytes, exact numbers, blobs, manifest, and every kind of damage found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from engram.emit import Knn, Logit, read_folder, write_tables
+from engram.emit.arrays import array, blocks, pad, triangle, unblocks
+from engram.emit.read import faults
+from engram.emit.write import c_float
+from engram.inputs import InputError
+
+NAME = "toy_task"
+
+
+def tables(n: int = 30, m: int = 5) -> list:
+    rng = np.random.default_rng(0)
+    domain = dict(inputs=[("a", "m"), ("b", "rad")], lo=-np.ones(2), hi=np.ones(2), held_out_error=0.1, held_out_text="[m] on 7")
+    return [
+        Knn(x=rng.uniform(-1, 1, (n, 2)), scale=np.array([1.0, 0.3]), value=rng.normal(size=(n, m)), **domain),
+        Logit(weight=np.array([1.5, -2.0]), bias=0.25, **domain),
+    ]
+
+
+def write(folder: Path, **sizes: int) -> dict:
+    return write_tables(
+        folder, NAME, tables(**sizes), robot_digest=1, task_digest=2, data_digest="d", provenance="engram fit toy"
+    )
+
+
+@pytest.mark.parametrize(
+    "value", [0.0, -0.0, 1.0, 0.1, -3.75, 1e-38, 1.17549435e-38, 3.4028235e38, 1e-45, float(np.float32(2) ** -149)]
+)
+def test_a_literal_restores_every_bit(value: float) -> None:
+    text = c_float(value)
+    back = np.float32(float.fromhex(text.rstrip("f")))
+    assert text.endswith("f") and back.tobytes() == np.float32(value).tobytes()
+
+
+def test_random_literals_restore_every_bit() -> None:
+    bits = np.random.default_rng(1).integers(0, 2**32, 5000, dtype=np.uint32).view(np.float32)
+    for value in bits[np.isfinite(bits)]:
+        assert np.float32(float.fromhex(c_float(value).rstrip("f"))).tobytes() == value.tobytes()
+
+
+def test_not_finite_is_refused_and_denormals_are_flushed() -> None:
+    for bad in (np.nan, np.inf, 1e39):
+        with pytest.raises(ValueError, match="'x' holds numbers that are not finite"):
+            array("x", "", np.array([1.0, bad]))
+    assert array("x", "", np.array([1e-40, -1e-40, 1e-37])).flat.tolist() == [0.0, 0.0, np.float32(1e-37)]
+
+
+def test_layouts() -> None:
+    x = np.arange(22.0).reshape(11, 2)
+    rows = blocks(x)
+    assert rows.shape == (4, 8) and rows[0, 3] == x[3, 0] and rows[1, 3] == x[3, 1] and rows[2, 2] == x[10, 0]
+    assert np.array_equal(unblocks(rows, 11, 2), x) and np.all(rows[2:, 3:] == 1e15)
+    lower = np.tril(np.ones((9, 9)))
+    assert triangle(lower).size == 8 * 8 + 16 and triangle(lower).sum() == 45 and pad(9) == 16
+
+
+def test_same_tables_same_bytes(tmp_path: Path) -> None:
+    first, second = write(tmp_path / "a"), write(tmp_path / "b")
+    assert first == second
+    for name in [*first["files"], "MANIFEST.json"]:
+        assert (tmp_path / "a" / name).read_bytes() == (tmp_path / "b" / name).read_bytes()
+
+
+def test_an_unchanged_file_is_left_alone(tmp_path: Path) -> None:
+    write(tmp_path)
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("*.[ch]")}
+    write(tmp_path)
+    assert before and all(path.stat().st_mtime_ns == stamp for path, stamp in before.items())
+
+
+def test_large_arrays_become_blobs_and_vanish_when_no_longer_needed(tmp_path: Path) -> None:
+    manifest = write(tmp_path, n=20_000)
+    entry = manifest["tables"][0]
+    assert f"{NAME}_knn_v1_value.bin" in entry["files"] and f"{NAME}_knn_v1.S" in entry["files"]
+    assert (tmp_path / f"{NAME}_knn_v1_value.bin").stat().st_size == 4 * 20_000 * 8
+    assert faults(tmp_path) == []
+    write(tmp_path, n=10)
+    assert list(tmp_path.glob("*.bin")) == [] and list(tmp_path.glob("*.S")) == []
+
+
+def test_what_is_written_is_read_back(tmp_path: Path) -> None:
+    write(tmp_path, n=20_000)
+    _, found = read_folder(tmp_path)
+    for table, source in zip(found, tables(n=20_000)):
+        assert table.data_digest == table.digest and (table.robot_digest, table.task_digest) == (1, 2)
+        for a, b in zip(table.arrays, source.arrays()):
+            assert a.name == b.name and np.array_equal(a.flat, b.flat)
+
+
+def test_damage_is_found(tmp_path: Path) -> None:
+    write(tmp_path, n=20_000)
+    blob = tmp_path / f"{NAME}_knn_v1_x.bin"
+    whole = bytearray(blob.read_bytes())
+    whole[100] ^= 1
+    blob.write_bytes(whole)
+    assert any("differs from the manifest" in fault for fault in faults(tmp_path))
+    assert any("the data's digest is" in fault for fault in faults(tmp_path))
+    blob.write_bytes(whole[:-4])
+    with pytest.raises(InputError, match="missing or not .* bytes long; run 'make tables'"):
+        faults(tmp_path)
+    write(tmp_path)
+    source = tmp_path / f"{NAME}_logit_v1.c"
+    source.write_text(source.read_text().replace(".robot_digest = 0x0000000000000001u", ".robot_digest = 0x0000000000000007u"))
+    assert any("robot_digest is 0x0000000000000007" in fault for fault in faults(tmp_path))
+    source.unlink()
+    with pytest.raises(InputError, match="cannot be read"):
+        faults(tmp_path)
+
+
+def test_wrong_shapes_and_double_names_are_refused(tmp_path: Path) -> None:
+    knn, logit = tables()
+    logit.lo = np.zeros(3)
+    with pytest.raises(ValueError, match="logit: 'lo' has shape"):
+        logit.arrays()
+    with pytest.raises(ValueError, match="two tables would be called 'toy_task_knn_v1'"):
+        write_tables(tmp_path, NAME, [knn, knn], robot_digest=0, task_digest=0, data_digest="", provenance="")
