@@ -8,6 +8,8 @@
 
 namespace engram {
 
+#pragma GCC diagnostic ignored "-Wpsabi"  // on a target without AVX: these functions are inlined, no ABI is crossed
+
 typedef float TabLanes __attribute__((vector_size(TAB_LANES * sizeof(float))));
 
 inline TabLanes tab_load(const float* p) {
