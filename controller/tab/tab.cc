@@ -89,7 +89,6 @@ TabStatus tab_check(const TabHead* head, TabKind kind, uint64_t robot_digest, ui
     return kTabBad;
   }
   out << tab_kind_text(kind) << " table '" << (head->name ? head->name : "?") << "' ";
-  const int begin = out.n;
   if (head->schema != TAB_SCHEMA) {
     out << "has schema " << uint64_t{head->schema} << ", this controller reads " << uint64_t{TAB_SCHEMA};
   } else if (head->kind != static_cast<uint32_t>(kind)) {
@@ -102,13 +101,12 @@ TabStatus tab_check(const TabHead* head, TabKind kind, uint64_t robot_digest, ui
     out << "has array sizes that contradict each other";
   } else if (const uint64_t digest = tab_digest(head); digest != head->digest) {
     out << "is damaged: the data's digest is " << digest << ", expected " << head->digest;
+  } else {
+    text[0] = 0;
+    return kTabOk;
   }
-  if (out.n > begin) {
-    out << "; run 'make tables' and build again";
-    return kTabBad;
-  }
-  text[0] = 0;
-  return kTabOk;
+  out << "; run 'make tables' and build again";
+  return kTabBad;
 }
 
 TabStatus tab_domain(const TabHead* head, const double* x) {

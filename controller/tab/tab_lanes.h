@@ -17,9 +17,9 @@ inline TabLanes tab_load(const float* p) {
   std::memcpy(&v, p, sizeof v);
   return v;
 }
-inline void tab_store(float* p, TabLanes v) { std::memcpy(p, &v, sizeof v); }
+inline void tab_store(float* p, const TabLanes& v) { std::memcpy(p, &v, sizeof v); }
 inline TabLanes tab_fill(float s) { return TabLanes{} + s; }
-inline float tab_sum(TabLanes v) { return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7])); }
+inline float tab_sum(const TabLanes& v) { return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7])); }
 
 // Squared distances of the scaled query to the eight samples of one block (d, 8). Two accumulators hide the latency of the additions.
 inline TabLanes tab_block_distance2(const float* block, const float* query, int32_t d) {
