@@ -8,6 +8,7 @@
 #include <Eigen/Core>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
 
 namespace engram {
 
@@ -49,29 +50,20 @@ inline double select(bool mask, double a, double b) { return mask ? a : b; }
 template <class S> inline S max(S a, S b) { return select(a > b, a, b); }
 template <class S> inline S min(S a, S b) { return select(a < b, a, b); }
 
-// Functions without a vector instruction run lane by lane.
-template <class F> inline Pack per_lane(Pack a, F f) {
-  Pack r;
-  for (int i = 0; i < kLanes; ++i) r.l[i] = f(a.l[i]);
-  return r;
-}
-inline Pack sqrt(Pack a) { return per_lane(a, [](double s) { return std::sqrt(s); }); }
-inline Pack abs(Pack a) { return select(a < Pack(0.0), -a, a); }
+// Bit patterns, for the branch-free functions of rbd_math.h.
+inline int64_t to_bits(double a) { int64_t b; std::memcpy(&b, &a, sizeof b); return b; }
+inline double from_bits(int64_t b) { double a; std::memcpy(&a, &b, sizeof a); return a; }
+inline Pack::Mask to_bits(Pack a) { return reinterpret_cast<Pack::Mask>(a.l); }
+inline Pack from_bits(Pack::Mask b) { return Pack(reinterpret_cast<Pack::Lanes>(b)); }
+
 inline double sqrt(double a) { return std::sqrt(a); }
-inline double abs(double a) { return std::fabs(a); }
-inline void sincos(double a, double& s, double& c) { s = std::sin(a); c = std::cos(a); }
-inline void sincos(Pack a, Pack& s, Pack& c) {
-  for (int i = 0; i < kLanes; ++i) {
-    s.l[i] = std::sin(a.l[i]);
-    c.l[i] = std::cos(a.l[i]);
-  }
-}
-inline double atan2(double y, double x) { return std::atan2(y, x); }
-inline Pack atan2(Pack y, Pack x) {
+inline Pack sqrt(Pack a) {
   Pack r;
-  for (int i = 0; i < kLanes; ++i) r.l[i] = std::atan2(y.l[i], x.l[i]);
+  for (int i = 0; i < kLanes; ++i) r.l[i] = std::sqrt(a.l[i]);
   return r;
 }
+inline double abs(double a) { return std::fabs(a); }
+inline Pack abs(Pack a) { return from_bits(to_bits(a) & INT64_MAX); }
 
 // How many values a scalar carries, and lane access that also works on double.
 template <class S> inline constexpr int lanes_of = 1;

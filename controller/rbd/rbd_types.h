@@ -2,6 +2,7 @@
 #ifndef CONTROLLER_RBD_RBD_TYPES_H_
 #define CONTROLLER_RBD_RBD_TYPES_H_
 
+#include "controller/rbd/rbd_math.h"
 #include "controller/rbd/rbd_pack.h"
 
 #include <Eigen/Core>

@@ -1,0 +1,161 @@
+// Analytic derivatives of inverse and forward dynamics.
+// Source: Carpentier & Mansard, Analytical Derivatives of Rigid Body Dynamics Algorithms (RSS 2018), in world coordinates.
+// The derivative with respect to q is taken along the tangent of rbd_manifold.h (free base: body twist).
+//
+// With V_p, A_p velocity and (gravity-free) acceleration of the parent body, V_i of the body itself, column k changes
+//   a velocity down the tree by        dVdq_k = V_p x J_k,                        dVdv_k = J_k,
+//   an acceleration down the tree by   dAdq_k = A_p x J_k + V_p x (V_p x J_k),    dAdv_k = (V_p + V_i) x J_k,
+// up to terms that move with the receiving body and cancel. A force down the tree then changes by
+//   dF = Y dA + C dV,   C x = V x* Y x - Y (V x x) + x x* Y V.
+// For a particle of mass m at r with velocity u, C x = 2 m (w_x x u) acting at r: C sees the angular part of x only.
+// Summed over a body: force w_x x 2p with p the linear momentum, moment (2 tr(N) 1 - 2 N) w_x with N = sum m u r'.
+#ifndef CONTROLLER_RBD_RBD_DERIVATIVES_H_
+#define CONTROLLER_RBD_RBD_DERIVATIVES_H_
+
+#include "controller/rbd/rbd_forward.h"
+
+namespace engram {
+
+// C above: force = w x p2, moment = D w.
+template <class S> struct Coriolis {
+  Vec3<S> p2;
+  Mat3<S> D;
+
+  Coriolis& operator+=(const Coriolis& b) { p2 += b.p2; D += b.D; return *this; }
+  Force<S> times(const Vec3<S>& w) const { return {cross(w, p2), mul(D, w)}; }
+  // g with J . C x = g . w_x
+  Vec3<S> transposed_times(const Motion<S>& J) const { return cross(p2, J.lin) + mul_transposed(D, J.ang); }
+};
+
+// N = sum m (u + w x r) r' = u mc' + [w]x E,  E = sum m r r' = tr(I)/2 1 - I  (tr([w]x E) = 0)
+template <class S> inline Coriolis<S> coriolis_of(const Inertia<S>& Y, const Motion<S>& V) {
+  Coriolis<S> C;
+  C.p2 = (V.lin * Y.mass - cross(Y.moment, V.ang)) * S(2.0);
+  const S half_trace = 0.5 * (Y.I[0] + Y.I[3] + Y.I[5]);
+  const Vec3<S> w2 = V.ang * S(2.0), u2 = V.lin * S(2.0);
+  const Vec3<S> E[3] = {{half_trace - Y.I[0], -Y.I[1], -Y.I[2]}, {-Y.I[1], half_trace - Y.I[3], -Y.I[4]}, {-Y.I[2], -Y.I[4], half_trace - Y.I[5]}};
+  for (int j = 0; j < 3; ++j) C.D.col(j) = -(cross(w2, E[j]) + u2 * Y.moment[j]);
+  const S trace = dot(u2, Y.moment);
+  for (int j = 0; j < 3; ++j) C.D(j, j) += trace;
+  return C;
+}
+
+// d tau / d q and d tau / d v (nv x nv each) of rbd_rnea, whose d must be at hand with d.Yc composite (rbd_composite_inertias).
+// Entries of dofs on different branches are zero.
+template <class R, class S>
+inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& dtau_dq, Mat<S, R::nv, R::nv>& dtau_dv) {
+  constexpr const Tree<R>& tree = kTree<R>;
+  Motion<S> dAdq[R::nv], dAdv[R::nv];
+  Vec3<S> dVdq[R::nv];               // angular part: all that C sees
+  Force<S> f[R::nj];                 // of the subtree
+  Coriolis<S> C[R::nj];              // of the subtree
+
+  for (int i = 0; i < R::nj; ++i) {
+    const int p = R::parent[i];
+    f[i] = d.f[i];
+    C[i] = coriolis_of(d.Y[i], d.V[i]);
+    for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) {
+      if (p < 0) {
+        dVdq[k].setZero();
+        dAdq[k] = cross(rbd_gravity_acceleration<R, S>(), d.J[k]);
+        dAdv[k] = cross(d.V[i], d.J[k]);
+      } else {
+        const Motion<S> dV = cross(d.V[p], d.J[k]);
+        dVdq[k] = dV.ang;
+        dAdq[k] = cross(d.A[p], d.J[k]) + cross(d.V[p], dV);
+        dAdv[k] = dV * S(2.0);  // V_i x J = V_p x J: J is a single column
+      }
+    }
+  }
+  dtau_dq.setZero();
+  dtau_dv.setZero();
+  for (int k = R::nv - 1; k >= 0; --k) {
+    const int i = tree.joint[k];
+    const Motion<S>& J = d.J[k];
+    // column k, rows towards the root: J_j . dF_k
+    const Force<S> dFdv = d.Yc[i] * dAdv[k] + C[i].times(J.ang);
+    const Force<S> dFdq = d.Yc[i] * dAdq[k] + C[i].times(dVdq[k]);
+    // seen from the joints before i the force f turns with dof k
+    const Force<S> dFdq_turned = dFdq + cross(J, f[i]);
+    for (int j = k; j >= 0; j = tree.parent[j]) {
+      dtau_dv(j, k) = dot(d.J[j], dFdv);
+      dtau_dq(j, k) = dot(d.J[j], tree.joint[j] == i ? dFdq : dFdq_turned);
+    }
+    // row k, columns towards the root: J_k . (Yc dA_j + C dV_j) = (Yc J_k) . dA_j + g . w(dV_j)
+    const Force<S> F = d.Yc[i] * J;
+    const Vec3<S> g = C[i].transposed_times(J);
+    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) {
+      dtau_dv(k, j) = dot(dAdv[j], F) + dot(g, d.J[j].ang);
+      dtau_dq(k, j) = dot(dAdq[j], F) + dot(g, dVdq[j]);
+    }
+    // hand the subtree on once the first dof of joint i is done
+    if (const int p = R::parent[i]; p >= 0 && k == R::iv[i]) {
+      f[p] += f[i];
+      C[p] += C[i];
+    }
+  }
+}
+
+// X := M^-1 X, row by row (all columns of a row at once), with the factor of rbd_forward_dynamics.
+template <class R, class S> inline void rbd_solve_rows(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& X) {
+  constexpr const Tree<R>& tree = kTree<R>;
+  const auto subtract_row = [&X](int to, S l, int from) {
+    for (int c = 0; c < R::nv; ++c) X(to, c) -= l * X(from, c);
+  };
+  for (int k = R::nv - 1; k >= 0; --k) {
+    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) subtract_row(j, d.L(k, j), k);
+  }
+  for (int k = 0; k < R::nv; ++k) {
+    for (int c = 0; c < R::nv; ++c) X(k, c) *= d.D_inv[k];
+    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) subtract_row(k, d.L(k, j), j);
+  }
+}
+
+// d a / d q, d a / d v and M^-1 = d a / d tau (nv x nv each):  d a = M^-1 (d tau - dtau_dq dq - dtau_dv dv).
+// Call right after rbd_forward_dynamics(q, v, tau, d, a); overwrites d.A and d.f with their values at a. No heap; cannot fail.
+template <class R, class S>
+inline void rbd_forward_derivatives(const S* /*q*/, const S* /*v*/, const S* /*tau*/, RbdData<R, S>& d, const S* a,
+                                    Mat<S, R::nv, R::nv>& da_dq, Mat<S, R::nv, R::nv>& da_dv, Mat<S, R::nv, R::nv>& Minv) {
+  // accelerations and forces are affine in a: add J a and Y J a
+  Motion<S> dA[R::nj];
+  for (int i = 0; i < R::nj; ++i) {
+    dA[i] = rbd_joint_motion(d, i, a);
+    if (const int p = R::parent[i]; p >= 0) dA[i] += dA[p];
+    d.A[i] += dA[i];
+    d.f[i] += d.Y[i] * dA[i];
+  }
+  rbd_rnea_derivatives(d, da_dq, da_dv);
+  for (int i = 0; i < R::nv; ++i) {
+    for (int j = 0; j < R::nv; ++j) {
+      da_dq(i, j) = -da_dq(i, j);
+      da_dv(i, j) = -da_dv(i, j);
+      Minv(i, j) = S(i == j ? 1.0 : 0.0);
+    }
+  }
+  rbd_solve_rows(d, da_dq);
+  rbd_solve_rows(d, da_dv);
+  rbd_solve_rows(d, Minv);
+}
+
+// d g / d q (nv x nv) after rbd_gravity, whose d.Yc (mass and moment of the subtrees) it reads: rbd_rnea_derivatives at v = a = 0.
+template <class R, class S> inline void rbd_gravity_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& dg_dq) {
+  constexpr const Tree<R>& tree = kTree<R>;
+  const Vec3<S> up = -constant3<S>(R::gravity);
+  Vec3<S> dA[R::nv];  // dAdq_k = (up x w_k, 0)
+  for (int k = 0; k < R::nv; ++k) dA[k] = cross(up, d.J[k].ang);
+  dg_dq.setZero();
+  for (int k = R::nv - 1; k >= 0; --k) {
+    const int i = tree.joint[k];
+    const Motion<S>& J = d.J[k];
+    const Inertia<S>& Y = d.Yc[i];
+    const Force<S> f = {up * Y.mass, cross(Y.moment, up)};
+    const Force<S> dF = {dA[k] * Y.mass, cross(Y.moment, dA[k])};
+    const Force<S> dF_turned = dF + cross(J, f);
+    for (int j = k; j >= 0; j = tree.parent[j]) dg_dq(j, k) = dot(d.J[j], tree.joint[j] == i ? dF : dF_turned);
+    const Vec3<S> F = J.lin * Y.mass - cross(Y.moment, J.ang);
+    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) dg_dq(k, j) = dot(F, dA[j]);
+  }
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_RBD_RBD_DERIVATIVES_H_

@@ -1,0 +1,60 @@
+// Named frames, points and collision spheres of the robot: placements, Jacobians, velocities. All after rbd_kinematics.
+#ifndef CONTROLLER_RBD_RBD_FRAMES_H_
+#define CONTROLLER_RBD_RBD_FRAMES_H_
+
+#include "controller/rbd/rbd_kinematics.h"
+
+namespace engram {
+
+// Placement of frame F in the world: axes R_WF, origin p_WF [m].
+template <class R, class S> inline void rbd_frame_placement(const RbdData<R, S>& d, int frame, Mat3<S>& R_WF, Vec3<S>& p_WF) {
+  const int i = R::frame_joint[frame];
+  p_WF = d.p_WJ[i] + mul(d.R_WJ[i], constant3<S>(R::p_JF[frame]));
+  R_WF = matmul(d.R_WJ[i], constant33<S>(R::R_JF[frame]));
+}
+
+// Jacobian (3 x nv) of a point p_W fixed to joint i: its velocity in world axes is J v.
+template <class R, class S> inline void rbd_point_jacobian(const RbdData<R, S>& d, int i, const Vec3<S>& p_W, Mat<S, 3, R::nv>& J) {
+  J.setZero();
+  for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
+    J.col(k) = d.J[k].lin + cross(d.J[k].ang, p_W);
+  }
+}
+
+// Jacobian (6 x nv, linear first) of a frame of joint i with origin p_WF: velocity of its origin and angular velocity, in world axes
+// (Pinocchio's LOCAL_WORLD_ALIGNED).
+template <class R, class S>
+inline void rbd_frame_jacobian(const RbdData<R, S>& d, int frame, const Vec3<S>& p_WF, Mat<S, 6, R::nv>& J) {
+  const int i = R::frame_joint[frame];
+  J.setZero();
+  for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
+    J.template block<3, 1>(0, k) = d.J[k].lin + cross(d.J[k].ang, p_WF);
+    J.template block<3, 1>(3, k) = d.J[k].ang;
+  }
+}
+
+// The same in the axes of the frame (Pinocchio's LOCAL).
+template <class R, class S>
+inline void rbd_frame_jacobian_local(const RbdData<R, S>& d, int frame, const Mat3<S>& R_WF, const Vec3<S>& p_WF,
+                                     Mat<S, 6, R::nv>& J) {
+  const int i = R::frame_joint[frame];
+  J.setZero();
+  for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
+    J.template block<3, 1>(0, k) = mul_transposed<S>(R_WF, d.J[k].lin + cross(d.J[k].ang, p_WF));
+    J.template block<3, 1>(3, k) = mul_transposed<S>(R_WF, d.J[k].ang);
+  }
+}
+
+// Velocity [m/s] in world axes of the point p_W fixed to joint i. After rbd_velocity.
+template <class R, class S> inline Vec3<S> rbd_point_velocity(const RbdData<R, S>& d, int i, const Vec3<S>& p_W) {
+  return d.V[i].lin + cross(d.V[i].ang, p_W);
+}
+
+// Centre of collision sphere s in the world [m].
+template <class R, class S> inline Vec3<S> rbd_sphere_position(const RbdData<R, S>& d, int s) {
+  const int i = R::sphere_joint[s];
+  return d.p_WJ[i] + mul(d.R_WJ[i], constant3<S>(R::p_JS[s]));
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_RBD_RBD_FRAMES_H_

@@ -1,0 +1,121 @@
+// Forward kinematics, and the data the rigid-body algorithms share.
+#ifndef CONTROLLER_RBD_RBD_KINEMATICS_H_
+#define CONTROLLER_RBD_RBD_KINEMATICS_H_
+
+#include "controller/rbd/rbd_spatial.h"
+#include "controller/rbd/rbd_tree.h"
+
+namespace engram {
+
+// Work space of one robot R over S. Spatial quantities are at the world origin in world axes.
+template <class R, class S> struct RbdData {
+  static_assert(only_base_is_free<R>(), "only the first joint may be free");
+
+  // written by rbd_kinematics
+  Mat3<S> R_WJ[R::nj];   // joint axes in world
+  Vec3<S> p_WJ[R::nj];   // joint origin [m]
+  Motion<S> J[R::nv];    // column k: velocity of the subtree of dof k per unit of v[k]
+
+  // written by rbd_velocity
+  Motion<S> V[R::nj];    // body velocity
+
+  // written by rbd_inertias
+  Inertia<S> Y[R::nj];   // body inertia
+  // written by rbd_crba
+  Inertia<S> Yc[R::nj];  // inertia of the subtree
+
+  // written by rbd_rnea and rbd_forward_dynamics
+  Motion<S> A[R::nj];    // body acceleration minus gravity
+  Force<S> f[R::nj];     // force that moves the body alone: Y A + V x* Y V
+
+  // written by rbd_forward_dynamics: M = L' D L, L unit lower triangular and as sparse as the tree
+  Mat<S, R::nv, R::nv> L;   // strictly lower part, entries (k, ancestor of k)
+  S D_inv[R::nv];
+};
+
+// Rotation matrix of a unit quaternion (x y z w).
+template <class S> inline Mat3<S> rotation_of(const S* quat) {
+  const S x = quat[0], y = quat[1], z = quat[2], w = quat[3];
+  const S x2 = x + x, y2 = y + y, z2 = z + z;
+  Mat3<S> R;
+  R << 1.0 - (y * y2 + z * z2), x * y2 - w * z2, x * z2 + w * y2,  //
+      x * y2 + w * z2, 1.0 - (x * x2 + z * z2), y * z2 - w * x2,   //
+      x * z2 - w * y2, y * z2 + w * x2, 1.0 - (x * x2 + y * y2);
+  return R;
+}
+
+// q (nq) -> d.R_WJ, d.p_WJ, d.J
+template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>& d) {
+  for (int i = 0; i < R::nj; ++i) {
+    // joint frame at q_i = 0
+    Mat3<S> R_WJ = constant33<S>(R::R_PJ[i]);
+    Vec3<S> p_WJ = constant3<S>(R::p_PJ[i]);
+    if (const int p = R::parent[i]; p >= 0) {
+      p_WJ = d.p_WJ[p] + mul(d.R_WJ[p], p_WJ);
+      R_WJ = matmul(d.R_WJ[p], R_WJ);
+    }
+    const S* qi = q + R::iq[i];
+    Motion<S>* J = d.J + R::iv[i];
+    switch (R::kind[i]) {
+      case kRevolute: {
+        S s, c;
+        sincos(qi[0], s, c);
+        const Vec3<S> x = R_WJ.col(0), y = R_WJ.col(1), z = R_WJ.col(2);
+        R_WJ.col(0) = x * c + y * s;
+        R_WJ.col(1) = y * c - x * s;
+        J[0] = {cross(p_WJ, z), z};
+        break;
+      }
+      case kPrismatic: {
+        const Vec3<S> z = R_WJ.col(2);
+        p_WJ += z * qi[0];
+        J[0] = {z, Vec3<S>::Zero()};
+        break;
+      }
+      case kFree: {
+        p_WJ += mul(R_WJ, Vec3<S>(qi[0], qi[1], qi[2]));
+        R_WJ = matmul(R_WJ, rotation_of(qi + 3));
+        for (int k = 0; k < 3; ++k) {
+          const Vec3<S> e = R_WJ.col(k);
+          J[k] = {e, Vec3<S>::Zero()};
+          J[3 + k] = {cross(p_WJ, e), e};
+        }
+        break;
+      }
+    }
+    d.R_WJ[i] = R_WJ;
+    d.p_WJ[i] = p_WJ;
+  }
+}
+
+// sum_k J_k x_k over the dofs of joint i
+template <class R, class S> inline Motion<S> rbd_joint_motion(const RbdData<R, S>& d, int i, const S* x) {
+  const int k = R::iv[i];
+  Motion<S> m = d.J[k] * x[k];
+  if (R::kind[i] == kFree) {
+    for (int l = 1; l < 6; ++l) m += d.J[k + l] * x[k + l];
+  }
+  return m;
+}
+
+// v (nv) -> d.V:  V_i = V_parent + J_i v_i. After rbd_kinematics.
+template <class R, class S> inline void rbd_velocity(const S* v, RbdData<R, S>& d) {
+  for (int i = 0; i < R::nj; ++i) {
+    const int p = R::parent[i];
+    d.V[i] = rbd_joint_motion(d, i, v);
+    if (p >= 0) d.V[i] += d.V[p];
+  }
+}
+
+// d.Y: inertia of every body. After rbd_kinematics.
+template <class R, class S> inline void rbd_inertias(RbdData<R, S>& d) {
+  for (int i = 0; i < R::nj; ++i) d.Y[i] = inertia_in_world(d.R_WJ[i], d.p_WJ[i], R::mass[i], R::com[i], R::inertia[i]);
+}
+
+// Acceleration of the world that stands in for gravity.
+template <class R, class S> inline Motion<S> rbd_gravity_acceleration() {
+  return {-constant3<S>(R::gravity), Vec3<S>::Zero()};
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_RBD_RBD_KINEMATICS_H_
