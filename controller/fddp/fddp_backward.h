@@ -19,24 +19,24 @@
 namespace engram {
 
 // M <- T' M: rows of the base block (6 x 6 T) of a matrix of n columns.
-inline void base_rows(const double (*T)[6], double* M, int ld, int n) {
+inline void base_rows(const Mat<double, 6, 6>& T, double* M, int ld, int n) {
   for (int j = 0; j < n; ++j) {
     double c[6];
     for (int i = 0; i < 6; ++i) {
       c[i] = 0.0;
-      for (int k = 0; k < 6; ++k) c[i] += T[k][i] * M[k * ld + j];
+      for (int k = 0; k < 6; ++k) c[i] += T(k, i) * M[k * ld + j];
     }
     for (int i = 0; i < 6; ++i) M[i * ld + j] = c[i];
   }
 }
 
 // M <- M T: columns of the base block of a matrix of m rows.
-inline void base_columns(const double (*T)[6], double* M, int ld, int m) {
+inline void base_columns(const Mat<double, 6, 6>& T, double* M, int ld, int m) {
   for (int i = 0; i < m; ++i) {
     double r[6];
     for (int j = 0; j < 6; ++j) {
       r[j] = 0.0;
-      for (int k = 0; k < 6; ++k) r[j] += M[i * ld + k] * T[k][j];
+      for (int k = 0; k < 6; ++k) r[j] += M[i * ld + k] * T(k, j);
     }
     for (int j = 0; j < 6; ++j) M[i * ld + j] = r[j];
   }
@@ -70,12 +70,12 @@ template <class P, int N> void value_before_integrator(const typename FddpWork<P
     for (int i = 0; i < nv; ++i) std::memcpy(w.Vqq[i], w.Vxx[i], nvp * sizeof(double));
     base_rows(m.E, &w.Vqq[0][0], nvp, nvp);
     base_columns(m.E, &w.Vqq[0][0], nvp, nv);
-    alignas(64) double g[6], e[6];
+    double g[6], e[6];
     for (int i = 0; i < 6; ++i) {
       g[i] = e[i] = 0.0;
       for (int k = 0; k < 6; ++k) {
-        g[i] += m.G[k][i] * w.Vx[k];
-        e[i] += m.E[k][i] * w.Vx[k];
+        g[i] += m.G(k, i) * w.Vx[k];
+        e[i] += m.E(k, i) * w.Vx[k];
       }
     }
     for (int i = 0; i < nv; ++i) w.Vx[ov + i] += dt * (i < 6 ? g[i] : w.Vx[i]);

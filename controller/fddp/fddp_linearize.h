@@ -20,8 +20,11 @@ struct KnotLanes {
 template <class Record> inline void gather(const Record* records, const KnotLanes& knots, int n, Pack* out) {
   const double* from[kLanes];
   for (int i = 0; i < kLanes; ++i) from[i] = reinterpret_cast<const double*>(&records[knots.index[i]]);
-  for (int e = 0; e < n; ++e)
-    for (int i = 0; i < kLanes; ++i) out[e].l[i] = from[i][e];
+  for (int e = 0; e < n; ++e) {
+    Pack p = 0.0;
+    for (int i = 0; i < kLanes; ++i) p.l[i] = from[i][e];
+    out[e] = p;
+  }
 }
 
 // n packs -> n doubles of each of the lanes' records.
@@ -41,8 +44,8 @@ template <class P, int N> void fddp_scatter_models(FddpWork<P, N>& w, const Knot
   block([](auto& m) { return m.Lz; }, w.lanes.Lz, L::nzp);
   for (int r = 0; r < L::nzp; ++r) block([r](auto& m) { return m.Lzz[r]; }, w.lanes.Lzz[r], padded(r + 1));
   if constexpr (P::kFreeBase) {
-    block([](auto& m) { return &m.E[0][0]; }, &w.lanes.E[0][0], 36);
-    block([](auto& m) { return &m.G[0][0]; }, &w.lanes.G[0][0], 36);
+    block([](auto& m) { return m.E.data(); }, w.lanes.E.data(), 36);
+    block([](auto& m) { return m.G.data(); }, w.lanes.G.data(), 36);
   }
 }
 

@@ -16,15 +16,13 @@ namespace engram {
 // Adds the time since its construction to a phase; does nothing without a clock.
 class FddpTimer {
  public:
-  FddpTimer(double (*now)(), double& sum) : now_(now), sum_(sum), start_(now ? now() : 0.0) {}
-  ~FddpTimer() {
-    if (now_) sum_ += now_() - start_;
-  }
+  FddpTimer(const FddpOpts& opts, double& sum) : opts_(opts), sum_(sum), start_(opts.now()) {}
+  ~FddpTimer() { sum_ += opts_.now() - start_; }
   FddpTimer(const FddpTimer&) = delete;
   FddpTimer& operator=(const FddpTimer&) = delete;
 
  private:
-  double (*now_)();
+  const FddpOpts& opts_;
   double& sum_;
   double start_;
 };
@@ -44,12 +42,12 @@ template <class P, int N>
 FddpStatus fddp_direction(const Horizon<P, N>& h, const FddpOpts& opts, bool relinearize, FddpWork<P, N>& w, FddpSolution<P, N>& s,
                           FddpStats& stats) {
   if (relinearize) {
-    FddpTimer timer(opts.now_us, stats.us[kLinearize]);
+    FddpTimer timer(opts, stats.us[kLinearize]);
     if (!fddp_linearize(h, s, w)) return FddpStatus::kNotFinite;
     if (!w.feasible && w.largest_gap < opts.gap_zero) w.feasible = true;
     s.cost = w.cost;
   }
-  FddpTimer timer(opts.now_us, stats.us[kBackward]);
+  FddpTimer timer(opts, stats.us[kBackward]);
   while (!fddp_backward(h, opts, w, s)) {  // at most log(reg_max / reg_min) / log(reg_factor) times
     w.reg = increased(w.reg, opts);
     if (w.reg >= opts.reg_max) return FddpStatus::kNotPositiveDefinite;
@@ -60,7 +58,7 @@ FddpStatus fddp_direction(const Horizon<P, N>& h, const FddpOpts& opts, bool rel
 // Line search along the direction, kLanes step lengths at a time. True if a step was accepted; s is then the new trajectory.
 template <class P, int N>
 bool fddp_step(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s, FddpStats& stats) {
-  FddpTimer timer(opts.now_us, stats.us[kRollout]);
+  FddpTimer timer(opts, stats.us[kRollout]);
   FddpIteration log;
   log.gap = w.gap;
   bool accepted = false;
@@ -101,19 +99,19 @@ bool fddp_step(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, 
 // Iterates from the guess in s to convergence or a budget. The result is in s; stats.status says how it ended.
 template <class P, int N>
 FddpStatus fddp_solve(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s, FddpStats& stats) {
-  const double start = opts.now_us ? opts.now_us() : 0.0;
+  const double start = opts.now();
   double slowest = 0.0;  // iteration so far, us
   fddp_start(opts, w, stats);
   bool relinearize = true;
   for (int i = 0; i < opts.iterations; ++i) {
-    const double begin = opts.now_us ? opts.now_us() : 0.0;
+    const double begin = opts.now();
     if (opts.budget_us > 0.0 && begin - start + slowest > opts.budget_us) return stats.status = FddpStatus::kDeadline;
     const FddpStatus direction = fddp_direction(h, opts, relinearize, w, s, stats);
     if (direction != FddpStatus::kIterationLimit) return stats.status = direction;
     relinearize = fddp_step(h, opts, w, s, stats);
     if (w.reg >= opts.reg_max) return stats.status = FddpStatus::kNotPositiveDefinite;
     if (w.feasible && stats.last().stop < opts.stop) return stats.status = FddpStatus::kConverged;
-    if (opts.now_us) slowest = std::fmax(slowest, opts.now_us() - begin);
+    slowest = std::fmax(slowest, opts.now() - begin);
   }
   return stats.status = FddpStatus::kIterationLimit;
 }

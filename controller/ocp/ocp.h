@@ -74,17 +74,18 @@ template <class R_, class... Terms> struct Ocp {
   // Next state, cost and linear-quadratic model of a knot.
   template <class S> static void linearize(const Knot<S>& knot, const S* x, const S* u, S* x_next, S& cost, Model<S>& M) {
     RbdData<R, S> d;
-    S a[nv], da_dq[nv][nv], da_dv[nv][nv], Minv[nv][nv];
+    S a[nv];
+    Mat<S, nv, nv> da_dq, da_dv, Minv;
     forward(x, u, d, a);
-    rbd_forward_derivatives<R>(x, x + nq, d, a, da_dq, da_dv, Minv);
+    rbd_forward_derivatives<R>(x, x + nq, u, d, a, da_dq, da_dv, Minv);
     for (int i = 0; i < nv; ++i) {
       for (int j = 0; j < Layout::nzp; ++j) M.D[i][j] = 0.0;
       for (int j = 0; j < nv; ++j) {
-        M.D[i][Layout::oq + j] = knot.dt * da_dq[i][j];
-        M.D[i][Layout::ov + j] = knot.dt * da_dv[i][j];
+        M.D[i][Layout::oq + j] = knot.dt * da_dq(i, j);
+        M.D[i][Layout::ov + j] = knot.dt * da_dv(i, j);
       }
       M.D[i][Layout::ov + i] += 1.0;
-      for (int j = 0; j < nu; ++j) M.D[i][Layout::ou + j] = knot.dt * Minv[i][first_actuated + j];
+      for (int j = 0; j < nu; ++j) M.D[i][Layout::ou + j] = knot.dt * Minv(i, first_actuated + j);
     }
     step(knot.dt, x, a, x_next);
     if constexpr (kFreeBase) {
@@ -96,12 +97,13 @@ template <class R_, class... Terms> struct Ocp {
       M.Lz[i] = 0.0;
       for (int j = 0; j < Layout::nzp; ++j) M.Lzz[i][j] = 0.0;
     }
-    S g[nv], dg_dq[nv][nv];
+    S g[nv];
+    Mat<S, nv, nv> dg_dq;
     if constexpr (kNeedsGravity) {
       rbd_gravity<R>(d, g);
       rbd_gravity_derivatives<R>(d, dg_dq);
     }
-    const KnotView<R, S> view{x, x + nq, u, d, g, dg_dq};
+    const KnotView<R, S> view{x, x + nq, u, d, g, &dg_dq};
     cost = 0.0;
     ((cost += Terms::expand(static_cast<const typename Terms::template Param<S>&>(knot), view, M)), ...);
   }

@@ -29,7 +29,7 @@ template <class R, int frame> struct FramePoseTerm {
     Mat3<S> R_WF;
     Vec3<S> p_WF, r_p, r_R;
     residual(p, k, R_WF, p_WF, r_p, r_R);
-    const Mat3<S> J_R = mul<S>(jlog3<S>(r_R), R_WF.transpose());  // d r_R = Jlog3 R_FW w_W
+    const Mat3<S> J_R = matmul<S>(jlog3<S>(r_R), R_WF.transpose());  // d r_R = Jlog3 R_FW w_W
     S J[6][R::nv], r[6], w[6];
     for (int a = 0; a < path.n; ++a) {
       const Motion<S>& column = k.d.J[path.dof[a]];
@@ -56,7 +56,7 @@ template <class R, int frame> struct FramePoseTerm {
     r_p = p_WF - Vec3<S>(p.pose_p[0], p.pose_p[1], p.pose_p[2]);
     Mat3<S> R_ref;
     for (int i = 0; i < 9; ++i) R_ref(i / 3, i % 3) = p.pose_R[i];
-    r_R = log3<S>(mul_transposed(R_ref, R_WF));
+    r_R = log3<S>(matmul_transposed(R_ref, R_WF));
   }
 };
 
@@ -82,17 +82,17 @@ template <class R, int frame> struct FramePlacementTerm {
   template <class S> static S expand(const Param<S>& p, const KnotView<R, S>& k, ModelOf<R, S>& M) {
     Mat3<S> R_WF, R_e;
     Vec3<S> p_WF, p_e;
-    S r[6], w[6], c = 0.0, Jlog[6][6];
+    S r[6], w[6], c = 0.0;
     residual(p, k, R_WF, p_WF, R_e, p_e, r);
-    jlog6(R_e, p_e, Jlog);
+    const Mat<S, 6, 6> Jlog = jlog6(Vec3<S>(r[3], r[4], r[5]), p_e);
     S J[6][R::nv];
     for (int a = 0; a < path.n; ++a) {  // J = Jlog6 J_local
       const Motion<S>& column = k.d.J[path.dof[a]];
       const Vec3<S> lin = mul_transposed(R_WF, Vec3<S>(column.lin + cross(column.ang, p_WF)));
       const Vec3<S> ang = mul_transposed(R_WF, column.ang);
       for (int i = 0; i < 6; ++i) {
-        J[i][a] = Jlog[i][0] * lin[0] + Jlog[i][1] * lin[1] + Jlog[i][2] * lin[2] + Jlog[i][3] * ang[0] + Jlog[i][4] * ang[1] +
-                  Jlog[i][5] * ang[2];
+        J[i][a] = Jlog(i, 0) * lin[0] + Jlog(i, 1) * lin[1] + Jlog(i, 2) * lin[2] + Jlog(i, 3) * ang[0] + Jlog(i, 4) * ang[1] +
+                  Jlog(i, 5) * ang[2];
       }
     }
     for (int i = 0; i < 6; ++i) {
@@ -111,9 +111,13 @@ template <class R, int frame> struct FramePlacementTerm {
     rbd_frame_placement<R>(k.d, frame, R_WF, p_WF);
     Mat3<S> R_ref;
     for (int i = 0; i < 9; ++i) R_ref(i / 3, i % 3) = p.placement_R[i];
-    R_e = mul_transposed(R_ref, R_WF);
+    R_e = matmul_transposed(R_ref, R_WF);
     p_e = mul_transposed(R_ref, Vec3<S>(p_WF - Vec3<S>(p.placement_p[0], p.placement_p[1], p.placement_p[2])));
-    log6(R_e, p_e, r);
+    const Motion<S> m = log6(R_e, p_e);
+    for (int i = 0; i < 3; ++i) {
+      r[i] = m.lin[i];
+      r[3 + i] = m.ang[i];
+    }
   }
 };
 

@@ -34,8 +34,8 @@ template <int nv_, int nu_> struct KnotLayout {
 // The base block of the integrator; nothing for a fixed base.
 template <bool free_base, class S> struct BaseBlock {};
 template <class S> struct BaseBlock<true, S> {
-  alignas(64) S E[6][6];  // d q' / d q         (6 x 6)
-  alignas(64) S G[6][6];  // d q' / d (dt v')   (6 x 6)
+  Mat<S, 6, 6> E;  // d q' / d q
+  Mat<S, 6, 6> G;  // d q' / d (dt v')
 };
 
 // S = double: one knot. S = Pack: kLanes knots side by side, element by element in the same order.

@@ -12,18 +12,18 @@
 
 namespace engram {
 
-// World W: nbox, box_p[nbox][3], box_R[nbox][9] (row-major), box_half[nbox][3], constexpr, metres, world axes.
+// World W: nbox, p_WO[nbox][3], R_WO[nbox][9] (row-major), half[nbox][3]: centre, axes and half sizes of the boxes [m], constexpr.
 template <class W> struct BoxField {
   static constexpr int count = W::nbox;
 
   // Signed distance of p to box i, negative inside; gradient in world axes (unit length almost everywhere).
   template <class S> static S distance(int i, const Vec3<S>& p, Vec3<S>& gradient) {
-    const Mat3<S> R_WB = constant33<S>(W::box_R[i]);
-    const Vec3<S> c = mul_transposed(R_WB, Vec3<S>(p - constant3<S>(W::box_p[i])));
+    const Mat3<S> R_WO = constant33<S>(W::R_WO[i]);
+    const Vec3<S> c = mul_transposed(R_WO, Vec3<S>(p - constant3<S>(W::p_WO[i])));
     Vec3<S> excess, sign;  // per axis: how far beyond the face, and on which side
     for (int k = 0; k < 3; ++k) {
       sign[k] = select(c[k] < S(0.0), S(-1.0), S(1.0));
-      excess[k] = abs(c[k]) - S(W::box_half[i][k]);
+      excess[k] = abs(c[k]) - S(W::half[i][k]);
     }
     const Vec3<S> out(max(excess[0], S(0.0)), max(excess[1], S(0.0)), max(excess[2], S(0.0)));
     const S outside = sqrt(dot(out, out));
@@ -34,7 +34,7 @@ template <class W> struct BoxField {
       const S face = select(excess[k] >= deepest, S(1.0), S(0.0));
       g[k] = sign[k] * select(deepest > S(0.0), out[k] * inverse, face);
     }
-    gradient = mul(R_WB, g);
+    gradient = mul(R_WO, g);
     return select(deepest > S(0.0), outside, deepest);
   }
 };
@@ -94,7 +94,7 @@ template <class R, class Field> struct ObstacleTerm {
   template <class S> static S cost(const Param<S>& p, const KnotView<R, S>& k) {
     S c = 0.0;
     for (int s = 0; s < R::nsphere; ++s) {
-      const Vec3<S> center = rbd_sphere_center<R>(k.d, s);
+      const Vec3<S> center = rbd_sphere_position<R>(k.d, s);
       for (int o = 0; o < Field::count; ++o) {
         Vec3<S> g;
         const S e = max(p.obstacle_margin + S(R::sphere_radius[s]) - Field::distance(o, center, g), S(0.0));
@@ -107,7 +107,7 @@ template <class R, class Field> struct ObstacleTerm {
   template <class S> static S expand(const Param<S>& p, const KnotView<R, S>& k, ModelOf<R, S>& M) {
     S c = 0.0;
     for (int s = 0; s < R::nsphere; ++s) {
-      const Vec3<S> center = rbd_sphere_center<R>(k.d, s);
+      const Vec3<S> center = rbd_sphere_position<R>(k.d, s);
       Vec3<S> gradient = Vec3<S>::Zero();  // - sum_o e_o g_o
       S H[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};  // sum_o [e_o > 0] g_o g_o': xx xy xz yy yz zz
       for (int o = 0; o < Field::count; ++o) {

@@ -34,9 +34,11 @@ template <class R> struct StateTerm {
       M.Lzz[z][z] += p.state_w[i];
     }
     if constexpr (base > 0) {  // d (q (-) q_ref) / d q = Jlog6 in the base block
+      Mat<S, 6, 6> J0, J1;
+      rbd_difference_jacobians(p.state_ref, k.q, J0, J1);
       S J[6][6], rb[6], w[6];
-      rbd_difference_jacobian<R>(p.state_ref, k.q, J);
       for (int i = 0; i < 6; ++i) {
+        for (int j = 0; j < 6; ++j) J[i][j] = J1(i, j);
         rb[i] = r[i];
         w[i] = p.state_w[i];
       }
@@ -78,7 +80,7 @@ template <class R, bool about_gravity> struct ControlTerm {
       M.Lz[L::ou + i] += wr;
       M.Lzz[L::ou + i][L::ou + i] += w;
       if constexpr (about_gravity) {  // d r / d q = -dg/dq
-        const S* const dg = k.dg_dq[first + i];
+        const auto dg = k.dg_dq->row(first + i);
         for (int a = 0; a < R::nv; ++a) {
           const S wJ = w * dg[a];
           M.Lz[a] -= wr * dg[a];

@@ -13,12 +13,12 @@ template <class R, class S> using ModelOf = KnotModel<LayoutOf<R>, kFreeBase<R>,
 
 // State, control and kinematics of one knot (kLanes knots when S = Pack).
 template <class R, class S> struct KnotView {
-  const S* q;                // (nq)
-  const S* v;                // (nv)
-  const S* u;                // (nu)
-  const RbdData<R, S>& d;    // kinematics at q
-  const S* g;                // gravity torque g(q) (nv), if a term asks for it
-  const S (*dg_dq)[R::nv];   // its derivative (nv x nv), if a term asks for it
+  const S* q;                         // (nq)
+  const S* v;                         // (nv)
+  const S* u;                         // (nu)
+  const RbdData<R, S>& d;             // kinematics at q
+  const S* g;                         // gravity torque g(q) (nv), if a term asks for it
+  const Mat<S, R::nv, R::nv>* dg_dq;  // its derivative, if a term asks for it
 };
 
 // The dofs that move a joint, from the root outward: count and indices, at compile time.
