@@ -127,7 +127,7 @@ typedef enum engram_mode {
 } engram_mode;
 
 // Microseconds of a clock that never goes back (thread CPU time, cycle counter). Called by the planner thread only.
-typedef double (*engram_clock)(void* context);
+typedef double (*engram_clock)(void);
 
 typedef struct engram_options {
   engram_mode memory;       // which guesses are tried
@@ -136,7 +136,6 @@ typedef struct engram_options {
   int32_t line_search;      // 1 to 10, step lengths tried per iteration: 1, 1/2, 1/4 ...
   double budget_us;         // us, 0 to 1e6: no further iteration begins after it. 0: iterations alone count (reproducible)
   engram_clock clock;       // times the phases and the budget; NULL: no times, and budget_us must be 0
-  void* clock_context;      // handed to clock
   double torque_rate;       // > 0, largest change of a torque in units of its limit per second (1/s)
   double clearance_min;     // m, a plan that comes nearer to an obstacle is not executed
   double switch_gain;       // 0 to 1: another guess replaces a good shifted plan when its merit is below (1 - gain) of it
