@@ -1,0 +1,291 @@
+// engram-plant: the robot and its world in MuJoCo, on LCM.
+//
+// One step of the plant, 1 ms:
+//   publish task (at a jump, while the target moves) and state of time t
+//   mj_step1: positions, velocities, contacts of time t; judge them; write the log      -- while the controller computes
+//   lock step: wait for the command that answers this state;  wall clock: take the latest one
+//   mj_step2: apply tau, integrate to t + 1 ms
+#include <unistd.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstring>
+#include <ctime>
+
+#include "sim_harness/sim_faults.h"
+#include "sim_harness/sim_judge.h"
+#include "sim_harness/sim_link.h"
+#include "sim_harness/sim_log.h"
+#include "sim_harness/sim_model.h"
+#include "sim_harness/sim_options.h"
+#include "sim_harness/sim_series.h"
+
+namespace engram::sim {
+namespace {
+
+constexpr int kTaskRepeat = 500;  // steps; on the wall clock the task is repeated for a controller that starts late
+
+enum ExitCode { kOk = 0, kBadInput = 2, kLogTruncated = 3, kNoController = 4, kUsage = 64 };
+
+struct PlantOptions {
+  std::string scene, series, log, results, timing, clock = "lockstep",
+                                                   url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4000000";
+  double duration = 0;    // s; 0: until the series ends
+  double log_full = 1e9;  // s
+  int log_every = 10;     // steps
+  double give_up = 10;    // s
+  int resend_ms = 250;    // ms
+  double warm_up = 0.02;  // s before the first task
+  double stale_ms = 20;   // ms
+  double damping = 2.0;   // N m s/rad
+  uint64_t robot_digest = 0;
+  FaultOptions faults;
+};
+
+constexpr char kAbout[] =
+    "engram-plant: simulates the robot of a scene in MuJoCo (1 kHz, torque control) and talks LCM:\n"
+    "state_t and task_t out, command_t, cycle_t and timing_t in. Runs and judges a series of reach tasks.\n"
+    "Exit code: 0 done, 2 bad input, 3 done but the log is cut short, 4 no controller answers, 64 wrong option.";
+
+PlantOptions read_options(int argc, char** argv) {
+  PlantOptions o;
+  parse_options(
+      argc, argv, kAbout,
+      {{"--scene", "FILE", "MJCF of robot and world", &o.scene},
+       {"--series", "FILE", "tasks to run (sim_harness/sim_series.h); without it the robot is only simulated", &o.series},
+       {"--duration", "S", "end after this much simulated time; default: when the series ends", &o.duration},
+       {"--lcm-url", "URL", "LCM provider; default udpm on port 7667, ttl 0", &o.url},
+       {"--clock", "lockstep|wall", "wait for each command (reproducible), or keep real time", &o.clock},
+       {"--log", "FILE", "LCM event log of state, task, cycle and command", &o.log},
+       {"--log-full", "S", "log every state of the first S seconds; default all (what engram replay can repeat)", &o.log_full},
+       {"--log-every", "N", "after that, log each N-th state and command; default 10", &o.log_every},
+       {"--timing", "FILE", "CSV of the controller's CPU times", &o.timing},
+       {"--results", "FILE", "JSON: how each jump ended, and counts", &o.results},
+       {"--give-up", "S", "lock step: end if no command comes for this long; default 10", &o.give_up},
+       {"--resend-ms", "MS", "lock step: send the state again after this long; default 250", &o.resend_ms},
+       {"--warm-up", "S", "simulated time before the first task; default 0.02", &o.warm_up},
+       {"--stale-ms", "MS", "wall clock: brake if the last command is older than this; default 20", &o.stale_ms},
+       {"--damping", "D", "wall clock: joint damping while braking (N m s/rad); default 2", &o.damping},
+       {"--robot-digest", "HEX", "digest of the robot, if neither scene nor series has it", &o.robot_digest},
+       {"--seed", "N", "seed of noise and random pushes; default 1", &o.faults.seed},
+       {"--noise-q", "RAD", "standard deviation of measured joint positions", &o.faults.noise_q},
+       {"--noise-v", "RAD/S", "standard deviation of measured velocities", &o.faults.noise_v},
+       {"--latency", "STEPS", "plant steps from a command to its effect", &o.faults.latency},
+       {"--push", "T,BODY,FX,FY,FZ,D", "force (N, world) on a body from T for D seconds; may be repeated", &o.faults.pushes},
+       {"--random-push-period", "S", "mean time between random pushes", &o.faults.random_push_period},
+       {"--random-push-force", "N", "their largest force", &o.faults.random_push_force},
+       {"--random-push-duration", "S", "their duration; default 0.1", &o.faults.random_push_duration}});
+  return o;
+}
+
+class Plant {
+ public:
+  explicit Plant(const PlantOptions& options) : o_(options), lock_step_(options.clock == "lockstep"), judge_(series_) {}
+  ~Plant() {
+    if (timing_) std::fclose(timing_);
+  }
+  Plant(const Plant&) = delete;
+  Plant& operator=(const Plant&) = delete;
+
+  std::string init();
+  ExitCode run();
+  std::string write_results(double wall_seconds) const;
+
+ private:
+  void begin_step();
+  bool answer_step();
+  void brake(double* tau) const;
+  bool finished() const;
+  bool log_this_step() const { return t_ < o_.log_full || (state_.seq - 1) % o_.log_every == 0; }
+
+  const PlantOptions o_;
+  const bool lock_step_;
+  Model model_;
+  Series series_;
+  Judge judge_;
+  Faults faults_;
+  EventLog log_;
+  Link link_;
+  std::FILE* timing_ = nullptr;
+  engram_msg_state_t state_{};
+  engram_msg_task_t task_{};
+  double t_ = 0;                     // s, plant clock
+  int64_t utime_ = 0, step_us_ = 0;  // us, the same clock
+  int64_t steps_ = 0, stale_steps_ = 0;
+};
+
+std::string Plant::init() {
+  if (!lock_step_ && o_.clock != "wall") return "--clock takes lockstep or wall";
+  if (o_.scene.empty()) return "--scene is missing; see --help";
+  if (o_.series.empty() && o_.duration <= 0) return "give --series or --duration; see --help";
+  if (o_.log_every < 1 || o_.faults.latency < 0) return "--log-every must be at least 1 and --latency at least 0";
+  std::string wrong = model_.load(o_.scene.c_str());
+  if (!wrong.empty()) return wrong;
+  step_us_ = static_cast<int64_t>(model_.m->opt.timestep * 1e6 + 0.5);
+
+  if (!o_.series.empty()) {
+    wrong = series_.read(o_.series.c_str(), model_.nq);
+    if (wrong.empty()) wrong = model_.select_hand(series_.hand.c_str());
+    if (!wrong.empty()) return wrong;
+    if (model_.robot_digest && series_.robot_digest && model_.robot_digest != series_.robot_digest) {
+      return "scene and series are of different robots (digests differ); write both again with `engram task` and `engram demo`";
+    }
+  }
+  const uint64_t digest = o_.robot_digest ? o_.robot_digest : model_.robot_digest ? model_.robot_digest : series_.robot_digest;
+  wrong = faults_.init(o_.faults, model_);
+  if (wrong.empty() && !o_.log.empty()) wrong = log_.open(o_.log.c_str());
+  if (wrong.empty() && !o_.timing.empty()) {
+    timing_ = std::fopen(o_.timing.c_str(), "w");
+    if (!timing_) wrong = "cannot write '" + o_.timing + "'";
+  }
+  if (wrong.empty()) wrong = link_.open(o_.url.c_str(), digest, model_.nu, o_.log.empty() ? nullptr : &log_, timing_);
+  state_.robot_digest = static_cast<int64_t>(digest);
+  state_.nq = model_.nq, state_.nv = model_.nv;
+  task_.task_digest = static_cast<int64_t>(series_.task_digest);
+  return wrong;
+}
+
+bool Plant::finished() const {
+  if (o_.duration > 0 && t_ > o_.duration) return true;
+  return !o_.series.empty() && judge_.finished();
+}
+
+// Publishes what the controller shall know about time t, then finds out about time t itself.
+void Plant::begin_step() {
+  Judge::Event event;
+  if (!o_.series.empty() && t_ >= o_.warm_up) event = judge_.begin_step(t_);
+  if (event.reset) {
+    const double rest[kMaxDof] = {};
+    state_.seq = 0;
+    mj_resetData(model_.m, model_.d);
+    model_.set_state(event.reset->q.data(), rest);
+  }
+  if (event.task) {
+    task_.utime = utime_;
+    ++task_.seq;
+    task_.jump = event.jump;
+    task_.n = static_cast<int32_t>(event.task->value.size());
+    std::copy(event.task->value.begin(), event.task->value.end(), task_.value);
+    link_.publish_task(task_);
+    log_.add(utime_, EventLog::kTask, kTaskChannel, link_.task_bytes(), link_.task_size());
+  }
+  state_.utime = utime_;
+  ++state_.seq, ++steps_;
+  model_.get_state(state_.q, state_.v);
+  faults_.measure(model_, state_.q, state_.v);
+  link_.publish_state(state_);
+
+  mj_step1(model_.m, model_.d);
+  if (log_this_step()) log_.add(utime_, EventLog::kState, kStateChannel, link_.state_bytes(), link_.state_size());
+  log_.flush(utime_);
+  if (const JumpRecord* r = judge_.judge(model_, t_)) {
+    std::printf("jump %d/%d %s %.2f s\n", r->jump, series_.jump_count(), r->reason().c_str(), r->t_end - r->t_start);
+    std::fflush(stdout);
+  }
+}
+
+// tau = tau_gravity-free damping: -D v of the driven joints
+void Plant::brake(double* tau) const {
+  for (int i = 0; i < model_.nu; ++i) tau[i] = -o_.damping * model_.d->qvel[model_.nv - model_.nu + i];
+}
+
+bool Plant::answer_step() {
+  double tau[kMaxDof] = {};
+  if (lock_step_) {
+    for (double waited = 0; !link_.wait_answer(o_.resend_ms); link_.resend()) {
+      waited += 1e-3 * o_.resend_ms;
+      if (waited >= o_.give_up) {
+        std::fprintf(stderr,
+                     "engram-plant: no command on ENGRAM_COMMAND for %.1f s at t = %.3f s (%lld messages refused); start "
+                     "engram-controller "
+                     "with --lcm-url '%s', or see its last message\n",
+                     waited, t_, static_cast<long long>(link_.refused().total()), o_.url.c_str());
+        return false;
+      }
+    }
+    std::memcpy(tau, link_.command().tau, sizeof tau);
+  } else {
+    link_.drain();
+    if (steps_ % kTaskRepeat == 0) link_.resend_task();
+    const int64_t age = utime_ - link_.command().utime;
+    if (link_.command().seq > 0 && age <= static_cast<int64_t>(1e3 * o_.stale_ms)) {
+      std::memcpy(tau, link_.command().tau, sizeof tau);
+    } else {
+      if (stale_steps_++ == 0) {
+        std::fprintf(stderr, "engram-plant: no fresh command at t = %.3f s: joints are braked until one comes (said once)\n", t_);
+      }
+      brake(tau);
+    }
+  }
+  model_.set_tau(faults_.delay(model_, tau));
+  judge_.command(model_.torque_share(), link_.command().status);
+  faults_.push(&model_, t_);
+  mj_step2(model_.m, model_.d);
+  utime_ += step_us_;
+  t_ = 1e-6 * static_cast<double>(utime_);
+  return true;
+}
+
+ExitCode Plant::run() {
+  using Clock = std::chrono::steady_clock;
+  const auto start = Clock::now();
+  timespec next{};
+  clock_gettime(CLOCK_MONOTONIC, &next);
+  bool alive = true;
+  while (alive && !finished()) {
+    begin_step();
+    if (!lock_step_) {  // the command that arrives within this step acts on it
+      next.tv_nsec += 1000 * step_us_;
+      next.tv_sec += next.tv_nsec / 1000000000;
+      next.tv_nsec %= 1000000000;
+      clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &next, nullptr);
+    }
+    alive = answer_step();
+  }
+  log_.close();
+  const std::string wrong = write_results(std::chrono::duration<double>(Clock::now() - start).count());
+  if (!wrong.empty()) std::fprintf(stderr, "engram-plant: %s\n", wrong.c_str());
+  if (!alive) return kNoController;
+  if (log_.truncated() || !wrong.empty()) return kLogTruncated;
+  return kOk;
+}
+
+std::string Plant::write_results(double wall_seconds) const {
+  if (o_.results.empty()) return "";
+  std::FILE* file = std::fopen(o_.results.c_str(), "w");
+  if (!file) return "cannot write '" + o_.results + "'";
+  const Refused& refused = link_.refused();
+  std::fprintf(file, "{\n  \"clock\": \"%s\",\n  \"steps\": %lld,\n  \"sim_seconds\": %.3f,\n  \"wall_seconds\": %.3f,\n",
+               o_.clock.c_str(), static_cast<long long>(steps_), t_, wall_seconds);
+  std::fprintf(file, "  \"robot_digest\": \"0x%016llx\",\n  \"task_digest\": \"0x%016llx\",\n",
+               static_cast<unsigned long long>(state_.robot_digest), static_cast<unsigned long long>(task_.task_digest));
+  std::fprintf(file, "  \"log\": {\"path\": \"%s\", \"events\": %lld, \"bytes\": %lld, \"truncated\": %s},\n",
+               log_.path().c_str(), static_cast<long long>(log_.events()), static_cast<long long>(log_.bytes()),
+               log_.truncated() ? "true" : "false");
+  std::fprintf(file,
+               "  \"refused\": {\"malformed\": %lld, \"foreign_robot\": %lld, \"not_finite\": %lld, \"second_answer\": %lld},\n"
+               "  \"resends\": %lld,\n  \"stale_steps\": %lld,\n  \"jumps\": ",
+               static_cast<long long>(refused.malformed), static_cast<long long>(refused.foreign_robot),
+               static_cast<long long>(refused.not_finite), static_cast<long long>(refused.second_answer),
+               static_cast<long long>(link_.resends()), static_cast<long long>(stale_steps_));
+  write_records(file, judge_.records());
+  std::fprintf(file, "\n}\n");
+  const bool failed = std::ferror(file) != 0;
+  return std::fclose(file) != 0 || failed ? "cannot write '" + o_.results + "': the disk is full" : "";
+}
+
+int plant_main(int argc, char** argv) {
+  install_mujoco_handlers("engram-plant");
+  Plant plant(read_options(argc, argv));
+  const std::string wrong = plant.init();
+  if (!wrong.empty()) {
+    std::fprintf(stderr, "engram-plant: %s\n", wrong.c_str());
+    return kBadInput;
+  }
+  return plant.run();
+}
+
+}  // namespace
+}  // namespace engram::sim
+
+int main(int argc, char** argv) { return engram::sim::plant_main(argc, argv); }

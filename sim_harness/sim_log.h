@@ -1,0 +1,55 @@
+// The run's LCM event log, in an order that does not depend on when messages happened to arrive.
+#ifndef ENGRAM_SIM_HARNESS_SIM_LOG_H_
+#define ENGRAM_SIM_HARNESS_SIM_LOG_H_
+
+#include <lcm/lcm.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace engram::sim {
+
+// Events are kept for kHoldBack and written sorted by (utime, rank, arrival), with the message's utime as the event's time stamp.
+// A full disk ends the log, not the run: one message, and truncated() from then on.
+class EventLog {
+ public:
+  static constexpr int64_t kHoldBack = 50000;  // us; longer than any message of a cycle lies behind its utime
+  enum Rank { kTask, kState, kCycle, kCommand };
+
+  EventLog() = default;
+  EventLog(const EventLog&) = delete;
+  EventLog& operator=(const EventLog&) = delete;
+  ~EventLog() { close(); }
+
+  std::string open(const char* path);  // empty string, or one line that says what is wrong
+  void add(int64_t utime, Rank rank, const char* channel, const void* data, int size);
+  void flush(int64_t now);  // writes what lies more than kHoldBack before `now`
+  void close();             // writes the rest
+
+  bool truncated() const { return truncated_; }
+  int64_t events() const { return events_; }
+  int64_t bytes() const { return bytes_; }
+  const std::string& path() const { return path_; }
+
+ private:
+  struct Event {
+    int64_t utime;
+    int rank;
+    const char* channel;
+    std::string data;
+  };
+  void write_before(int64_t utime);
+  void truncate();
+
+  lcm_eventlog_t* log_ = nullptr;
+  std::string path_;
+  std::vector<Event> pending_;
+  std::vector<char> buffer_;
+  bool truncated_ = false;
+  int64_t events_ = 0, bytes_ = 0;
+};
+
+}  // namespace engram::sim
+
+#endif  // ENGRAM_SIM_HARNESS_SIM_LOG_H_
