@@ -28,7 +28,7 @@ configure() {
   local log=build/logs/cmake-${dir//\//-}.log
   say build "configuring $dir/ ($type${*:+, $*})"
   cmake -G Ninja -S . -B "$dir" -DCMAKE_BUILD_TYPE="$type" -DPython_EXECUTABLE="$PWD/.venv/bin/python" "$@" > "$log" 2>&1 < /dev/null ||
-    { tail -n 20 "$log" >&2; fail "CMake failed, see $log" "scripts/setup.sh packages"; }
+    { tail -n 20 "$log" >&2; fail "CMake failed, see $log" "read the lines above; scripts/setup.sh packages installs what a build needs"; }
   echo "$stamp" > "$dir/stamp"
 }
 

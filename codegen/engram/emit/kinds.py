@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,7 +11,7 @@ from engram.emit.arrays import Array, array, blocks, pad, padded_rows, triangle
 
 
 @dataclass(kw_only=True)
-class Table:
+class Table(ABC):
     """What all kinds have in common (TabHead). `lo`, `hi`: domain; `inputs`: (name, unit) per input."""
 
     inputs: list[tuple[str, str]]
@@ -22,17 +23,17 @@ class Table:
     constant: str = field(init=False, default="")  # its TabKind
 
     @property
+    @abstractmethod
     def outputs(self) -> int:
         """Number of outputs (nout)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def fields(self) -> dict[str, int | np.float32]:
         """Scalars of the C struct, in its order."""
-        raise NotImplementedError
 
+    @abstractmethod
     def own_arrays(self) -> list[Array]:
         """Arrays of the C struct, in its order."""
-        raise NotImplementedError
 
     def arrays(self) -> list[Array]:
         """All arrays, domain first: the order of TabHead.array."""
