@@ -1,12 +1,15 @@
-"""Write a task's constants for the controller (task.h) and its scene for MuJoCo."""
+"""Write a task's constants for the controller (task.h) and its scenes for MuJoCo."""
 
 import argparse
 from pathlib import Path
 
-from engram.paths import MODELS, TABLES, relative
+from engram.inputs import InputError
+from engram.paths import BUILD, MODELS, TABLES, relative
 
 EXAMPLES = """examples:
-  engram task panda reach       constants and scene of models/panda/reach/
+  engram task panda reach             constants of models/panda/reach/, and a scene with collision geoms only
+  engram robot panda --meshes &&
+  engram task panda reach --meshes    also build/scene/panda_reach.xml, which shows the robot's meshes
 """
 
 
@@ -15,19 +18,32 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser = subparsers.add_parser("task", help=__doc__, description=__doc__, epilog=EXAMPLES)
     parser.add_argument("robot", help="folder of models/ that holds a robot.toml")
     parser.add_argument("task", help="folder of models/<robot>/ that holds a task.toml and a world.xml")
+    parser.add_argument("--meshes", action="store_true", help="also write the scene with visual meshes (for rendering)")
     parser.add_argument("--models", type=Path, default=MODELS, help="where robots are described (default: models/)")
     parser.add_argument("--tables", type=Path, default=TABLES, help="where to write (default: tables/)")
+    parser.add_argument("--build", type=Path, default=BUILD, help="where meshes are and the shown scene goes (default: build/)")
     return parser
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write task.h."""
+    """Write task.h and scene.xml; with --meshes also the scene that shows the robot's meshes."""
     from engram.tasks.emit_header import task_header
+    from engram.tasks.scene import scene_mjcf
     from engram.tasks.spec import load_task
 
     spec = load_task(args.robot, args.task, args.models)
+    world = args.models / args.robot / args.task / "world.xml"
     folder = args.tables / f"{args.robot}_{args.task}"
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "task.h").write_text(task_header(spec), encoding="utf-8")
-    print(f"task:   {relative(folder)}/task.h  task vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}  digest {spec.digest:016x}")
+    scene = scene_mjcf(spec, args.tables / args.robot / "robot.xml", world, folder)
+    (folder / "scene.xml").write_text(scene, encoding="utf-8")
+    print(f"task:   {relative(folder)}/task.h scene.xml  vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}  digest {spec.digest:016x}")
+    if args.meshes:
+        shown = args.build / "scene"
+        if not (shown / f"{args.robot}.xml").is_file():
+            raise InputError(f"no {relative(shown)}/{args.robot}.xml; first run: engram robot {args.robot} --meshes")
+        path = shown / f"{args.robot}_{args.task}.xml"
+        path.write_text(scene_mjcf(spec, shown / f"{args.robot}.xml", world, shown), encoding="utf-8")
+        print(f"task:   {relative(path)}")
     return 0
