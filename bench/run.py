@@ -1,0 +1,258 @@
+"""Time the controller's solver and rigid-body algorithms beside their peers, in one run: `make bench`.
+
+First the gate: both sides compute the same numbers from the same input, to the tolerances below. Then the two executables
+alternate, A B A B, so that a drift of the machine's speed hits both; every ratio is peer / ours of the medians, and none is
+printed where the gate does not hold. The figures go to build/figures/bench.json.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "bench" / "peers"))
+
+# The same formulas in another order of summation: what double precision leaves after one linearization or recursion.
+DERIVATIVE_TOLERANCE = 1e-9
+# Relative; both sides stop on an expected improvement below 1e-9, far inside this.
+COST_TOLERANCE = 1e-8
+# The stopping criterion may cross its threshold one iteration apart.
+ITERATION_TOLERANCE = 1
+
+PROBLEMS = {"arm30": ("panda", 30), "arm100": ("panda", 100)}
+PHASES = ("solve1", "calcdiff", "backward", "forward")
+LINEARIZATION = ("cost", "gap", "Fx", "Fu", "Lx", "Lu", "Lxx", "Lxu", "Luu", "K", "k")
+RIGID_BODY = ("fk", "rnea", "aba", "crba", "rnea_derivatives", "aba_derivatives")
+
+
+def run_json(*command: object) -> dict:
+    """What a benchmark program prints, on one thread."""
+    done = subprocess.run(
+        [str(c) for c in command], capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"}
+    )
+    if done.returncode:
+        raise SystemExit(f"error: {' '.join(map(str, command))}: {done.stderr.strip()}")
+    return json.loads(done.stdout)
+
+
+def build_peers(folder: Path) -> None:
+    """Compile the peers against the wheels of this environment (a few minutes the first time)."""
+    import pinocchio
+
+    prefix = next(p for p in Path(pinocchio.__file__).parents if p.name == "cmeel.prefix")
+    log = folder.parent / "logs" / "peers.log"
+    log.parent.mkdir(parents=True, exist_ok=True)
+    print("bench: building the peers (minutes the first time)", flush=True)
+    with log.open("w") as out:
+        for command in (
+            ["cmake", "-G", "Ninja", "-S", ROOT / "bench/peers", "-B", folder, f"-DPEER_PREFIX={prefix}"],
+            ["ninja", "-C", folder],
+        ):
+            if subprocess.run(command, stdout=out, stderr=out).returncode:
+                raise SystemExit(f"error: the peers do not build, see {log}")
+
+
+def export_models(folder: Path) -> None:
+    from export_models import load, text
+
+    folder.mkdir(parents=True, exist_ok=True)
+    for robot in sorted({robot for robot, _ in PROBLEMS.values()}):
+        (folder / f"{robot}.txt").write_text(text(robot, *load(robot)))
+
+
+# ---- the gate ------------------------------------------------------------------------------------------------------------
+
+
+def difference(a: list[float], b: list[float]) -> float:
+    """Largest difference, relative to the largest entry of b or 1; infinite if the sizes differ."""
+    if len(a) != len(b):
+        return np.inf
+    a, b = np.asarray(a), np.asarray(b)
+    return float(np.max(np.abs(a - b)) / max(1.0, np.max(np.abs(b))))
+
+
+def gate(name: str, errors: dict[str, float], tolerance: float) -> bool:
+    worst = max(errors, key=errors.__getitem__)
+    holds = errors[worst] <= tolerance
+    verdict = "holds" if holds else "FAILS"
+    print(f"  gate {name:<28} {verdict}: largest error {errors[worst]:.1e} ({worst}), allowed {tolerance:.0e}")
+    return holds
+
+
+def gate_problem(name: str, ours: dict, peer: dict) -> bool:
+    same_model = gate(f"{name} derivatives, gains", {f: difference(ours[f], peer[f]) for f in LINEARIZATION}, DERIVATIVE_TOLERANCE)
+    cost = abs(ours["cost_converged"] - peer["cost_converged"]) / abs(peer["cost_converged"])
+    same_cost = gate(f"{name} converged cost", {"cost": cost}, COST_TOLERANCE)
+    iterations = abs(ours["iterations"] - peer["iterations"])
+    same_path = gate(f"{name} iterations", {f"{ours['iterations']:g} and {peer['iterations']:g}": iterations}, ITERATION_TOLERANCE)
+    return same_model and same_cost and same_path
+
+
+# ---- times ---------------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class Samples:
+    """Microseconds, pooled over the rounds."""
+
+    us: np.ndarray
+
+    @property
+    def median(self) -> float:
+        return float(np.median(self.us))
+
+    def row(self) -> str:
+        return f"{self.us.min():9.3f} {self.median:9.3f} {np.percentile(self.us, 99):9.3f} {self.us.max():9.3f}"
+
+
+def alternate(rounds: int, ours: list, peer: list) -> tuple[dict[str, Samples], dict[str, Samples]]:
+    """Run the two commands in turn; samples by name."""
+    pooled: list[dict[str, list[float]]] = [{}, {}]
+    for _ in range(rounds):
+        for side, command in zip(pooled, (ours, peer), strict=True):
+            for name, samples in run_json(*command).items():
+                if isinstance(samples, list):
+                    side.setdefault(name, []).extend(samples)
+    return tuple({name: Samples(np.array(us)) for name, us in side.items()} for side in pooled)
+
+
+class Figures:
+    """The table on the terminal, and the rows of bench.json."""
+
+    def __init__(self) -> None:
+        self.rows: list[dict] = []
+
+    def title(self, text: str) -> None:
+        print(f"\n{text}\n  {'us':<18}{'ours min':>11} {'median':>9} {'p99':>9} {'worst':>9}   "
+              f"{'peer min':>9} {'median':>9} {'p99':>9} {'worst':>9}   {'ratio':>6}  {'GFLOP/s':>7}")
+
+    def add(self, group: str, name: str, ours: Samples, peer: Samples | None, holds: bool, flops: float | None) -> None:
+        row = {"id": f"bench.{group}.{name}", "value": ours.median, "unit": "us", "n": len(ours.us), "gate": holds}
+        if peer is not None:
+            row["peer"] = peer.median
+            if holds:
+                row["ratio"] = peer.median / ours.median
+        self.rows.append(row)
+        ratio = f"{row['ratio']:6.2f}" if "ratio" in row else " " * 6
+        rate = f"{flops / ours.median * 1e-3:7.1f}" if flops else ""
+        print(f"  {name:<18}  {ours.row()}   {peer.row() if peer else ' ' * 39}   {ratio}  {rate}")
+
+    def write(self, path: Path) -> None:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(self.rows, indent=1) + "\n")
+
+
+class Bench:
+    def __init__(self, build: Path, rounds: int, n: int) -> None:
+        self.ours = build / "bench" / "engram_bench"
+        self.peers = build / "peers"
+        self.inputs = build / "bench" / "inputs"
+        self.rounds, self.n = rounds, n
+        self.figures = Figures()
+        self.all_hold = True
+        if not self.ours.exists():
+            raise SystemExit(f"error: {self.ours} is not built\n  mend: ninja -C {build} engram_bench")
+        build_peers(self.peers)
+        export_models(self.inputs)
+
+    def numbers(self, name: str, *arrays: np.ndarray) -> Path:
+        path = self.inputs / f"{name}.txt"
+        np.savetxt(path, np.concatenate([a.ravel() for a in arrays]), fmt="%.17g")
+        return path
+
+    def problem(self, name: str) -> None:
+        robot, T = PROBLEMS[name]
+        model = self.inputs / f"{robot}.txt"
+        peer_exe = self.peers / "crocoddyl_bench"
+        # a fixed trajectory far from any optimum, with gaps everywhere: around the posture of the cold start
+        from export_models import load
+
+        pin_model, q_ref = load(robot)
+        rng = np.random.default_rng(0)
+        xs = np.r_[q_ref, np.zeros(pin_model.nv)] + 0.1 * rng.standard_normal((T + 1, pin_model.nq + pin_model.nv))
+        us = rng.standard_normal((T, pin_model.nv))
+        trajectory = self.numbers(name, xs, us)
+        ours = run_json(self.ours, "compare", name, trajectory)
+        holds = gate_problem(name, ours, run_json(peer_exe, model, "compare", name, trajectory))
+        self.all_hold &= holds
+
+        mine, peer = alternate(
+            self.rounds, [self.ours, "time", name, self.n], [peer_exe, model, "time", name, self.n]
+        )
+        self.figures.title(f"{name}: {T} knots, FDDP beside Crocoddyl 3.2.1 (wheel, SSE2), one thread")
+        for phase in PHASES:
+            self.figures.add(name, phase, mine[phase], peer[phase], holds, ours.get(f"flops_{phase}"))
+        print(f"  solve1 per knot: {mine['solve1'].median / T:.2f} us, peer {peer['solve1'].median / T:.2f} us")
+
+    def rigid_body(self, robot: str) -> None:
+        from export_models import load
+
+        model, _ = load(robot)
+        rng = np.random.default_rng(0)
+        import pinocchio as pin
+
+        pin.seed(0)
+        samples = [
+            np.r_[pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq)), rng.uniform(-1, 1, 3 * model.nv)]
+            for _ in range(64)
+        ]
+        file = self.numbers(f"{robot}_samples", *samples)
+        peer_exe = self.peers / "pinocchio_bench"
+        text = self.inputs / f"{robot}.txt"
+        ours, theirs = run_json(self.ours, "compare", robot, file), run_json(peer_exe, text, "compare", file)
+        holds = gate(robot, {name: difference(ours[name], theirs[name]) for name in theirs}, DERIVATIVE_TOLERANCE)
+        self.all_hold &= holds
+
+        mine, peer = alternate(
+            self.rounds, [self.ours, "time", robot, file, self.n], [peer_exe, text, "time", file, self.n]
+        )
+        self.figures.title(f"{robot}: beside Pinocchio 4.0 (own build, -march=native), one state after the other, then in lanes")
+        for name in RIGID_BODY:
+            rivals = [peer[p] for p in (name, f"{name}_world") if p in peer]  # the convention that is faster here
+            best = min(rivals, key=lambda s: s.median)
+            flops = ours.get(f"flops_{name}")
+            self.figures.add(robot, name, mine[name], best, holds, flops)
+            self.figures.add(robot, f"{name}_lanes", mine[f"{name}_lanes"], best, holds, flops)
+
+    def gemm(self) -> None:
+        """The limit: the best rate of a matrix product, under our flags and under the machine's own."""
+        mine, peer = alternate(1, [self.ours, "gemm", 50], [self.peers / "pinocchio_bench", "-", "gemm", 50])
+        rate = {
+            side: max(2 * int(name.removeprefix("gemm")) ** 3 / s.us.min() * 1e-3 for name, s in samples.items())
+            for side, samples in (("ours", mine), ("native", peer))
+        }
+        self.figures.rows += [
+            {"id": f"bench.gemm.{side}", "value": value, "unit": "GFLOP/s", "n": 50, "gate": True} for side, value in rate.items()
+        ]
+        print(f"\nmatrix product (Eigen, double): {rate['ours']:.0f} GFLOP/s under our flags, {rate['native']:.0f} with -march=native")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--build", type=Path, default=ROOT / "build", help="build folder (default: build)")
+    parser.add_argument("--rounds", type=int, default=7, help="how often the two sides alternate (default: 7)")
+    parser.add_argument("-n", type=int, default=300, help="samples per round (default: 300)")
+    args = parser.parse_args()
+    bench = Bench(args.build.resolve(), args.rounds, args.n)
+    for name in PROBLEMS:
+        bench.problem(name)
+    bench.rigid_body("panda")
+    bench.gemm()
+    out = args.build / "figures" / "bench.json"
+    bench.figures.write(out)
+    print(f"\nwrote {out}")
+    if not bench.all_hold:
+        print("error: a gate does not hold; its ratios are left out", file=sys.stderr)
+    return not bench.all_hold
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
