@@ -28,17 +28,17 @@ template <class S> struct ArticulatedInertia {
     return *this;
   }
   friend Force<S> operator*(const ArticulatedInertia& I, const Motion<S>& a) {
-    return {mul_symmetric(I.A, a.lin) + mul(I.B, a.ang), mul_transposed(I.B, a.lin) + mul_symmetric(I.C, a.ang)};
+    return {mul_symmetric_add(I.A, a.lin, mul(I.B, a.ang)), mul_symmetric_add(I.C, a.ang, mul_transposed(I.B, a.lin))};
   }
   // I -= s U U'
   void downdate(const Force<S>& U, S s) {
     const Vec3<S> f = U.lin * s, n = U.ang * s;
     for (int i = 0, e = 0; i < 3; ++i) {
       for (int j = i; j < 3; ++j, ++e) {
-        A[e] -= f[i] * U.lin[j];
-        C[e] -= n[i] * U.ang[j];
+        A[e] = nmadd(f[i], U.lin[j], A[e]);
+        C[e] = nmadd(n[i], U.ang[j], C[e]);
       }
-      for (int j = 0; j < 3; ++j) B(i, j) -= f[i] * U.ang[j];
+      for (int j = 0; j < 3; ++j) B(i, j) = nmadd(f[i], U.ang[j], B(i, j));
     }
   }
 };
@@ -69,7 +69,7 @@ template <class R, class S> inline void rbd_aba(const S* q, const S* v, const S*
       u[k] = (tau[k] - dot(d.J[k], pA[i])) * D_inv[k];
       // IA - U U' / D,  pA + U u / D
       IA[i].downdate(U[k], D_inv[k]);
-      pA[i] += U[k] * u[k];
+      pA[i] = madd(U[k], u[k], pA[i]);
     }
     if (const int p = R::parent[i]; p >= 0) {
       pA[p] += pA[i] + IA[i] * A[i];
@@ -80,8 +80,8 @@ template <class R, class S> inline void rbd_aba(const S* q, const S* v, const S*
     const int p = R::parent[i];
     A[i] += p < 0 ? rbd_gravity_acceleration<R, S>() : A[p];
     for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) {
-      a[k] = u[k] - dot(A[i], U[k]) * D_inv[k];
-      A[i] += d.J[k] * a[k];
+      a[k] = nmadd(dot(A[i], U[k]), D_inv[k], u[k]);
+      A[i] = madd(d.J[k], a[k], A[i]);
     }
   }
 }

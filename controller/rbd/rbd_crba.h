@@ -44,7 +44,7 @@ template <class R, class S> inline void rbd_factor(Mat<S, R::nv, R::nv>& M, S* D
     D_inv[k] = 1.0 / M(k, k);
     for (int i = tree.parent[k]; i >= 0; i = tree.parent[i]) {
       const S l = M(k, i) * D_inv[k];
-      for (int j = i; j >= 0; j = tree.parent[j]) M(i, j) -= l * M(k, j);
+      for (int j = i; j >= 0; j = tree.parent[j]) M(i, j) = nmadd(l, M(k, j), M(i, j));
       M(k, i) = l;
     }
   }
@@ -54,11 +54,11 @@ template <class R, class S> inline void rbd_factor(Mat<S, R::nv, R::nv>& M, S* D
 template <class R, class S> inline void rbd_factor_solve(const Mat<S, R::nv, R::nv>& L, const S* D_inv, S* x) {
   constexpr const Tree<R>& tree = kTree<R>;
   for (int k = R::nv - 1; k >= 0; --k) {
-    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) x[j] -= L(k, j) * x[k];
+    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) x[j] = nmadd(L(k, j), x[k], x[j]);
   }
   for (int k = 0; k < R::nv; ++k) {
     x[k] *= D_inv[k];
-    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) x[k] -= L(k, j) * x[j];
+    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) x[k] = nmadd(L(k, j), x[j], x[k]);
   }
 }
 

@@ -16,25 +16,25 @@
 
 namespace engram {
 
-// C above: force = w x p2, moment = D w.
+// C above: C x = (w x p2, D w).
 template <class S> struct Coriolis {
   Vec3<S> p2;
   Mat3<S> D;
 
   Coriolis& operator+=(const Coriolis& b) { p2 += b.p2; D += b.D; return *this; }
-  Force<S> times(const Vec3<S>& w) const { return {cross(w, p2), mul(D, w)}; }
+  Force<S> times_add(const Vec3<S>& w, const Force<S>& f) const { return {cross_add(w, p2, f.lin), mul_add(D, w, f.ang)}; }
   // g with J . C x = g . w_x
-  Vec3<S> transposed_times(const Motion<S>& J) const { return cross(p2, J.lin) + mul_transposed(D, J.ang); }
+  Vec3<S> transposed_times(const Motion<S>& J) const { return cross_add(p2, J.lin, mul_transposed(D, J.ang)); }
 };
 
 // N = sum m (u + w x r) r' = u mc' + [w]x E,  E = sum m r r' = tr(I)/2 1 - I  (tr([w]x E) = 0)
 template <class S> inline Coriolis<S> coriolis_of(const Inertia<S>& Y, const Motion<S>& V) {
   Coriolis<S> C;
-  C.p2 = (V.lin * Y.mass - cross(Y.moment, V.ang)) * S(2.0);
   const S half_trace = 0.5 * (Y.I[0] + Y.I[3] + Y.I[5]);
   const Vec3<S> w2 = V.ang * S(2.0), u2 = V.lin * S(2.0);
+  C.p2 = cross_add<S>(w2, Y.moment, u2 * Y.mass);
   const Vec3<S> E[3] = {{half_trace - Y.I[0], -Y.I[1], -Y.I[2]}, {-Y.I[1], half_trace - Y.I[3], -Y.I[4]}, {-Y.I[2], -Y.I[4], half_trace - Y.I[5]}};
-  for (int j = 0; j < 3; ++j) C.D.col(j) = -(cross(w2, E[j]) + u2 * Y.moment[j]);
+  for (int j = 0; j < 3; ++j) C.D.col(j) = -cross_add<S>(w2, E[j], u2 * Y.moment[j]);
   const S trace = dot(u2, Y.moment);
   for (int j = 0; j < 3; ++j) C.D(j, j) += trace;
   return C;
@@ -62,7 +62,7 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
       } else {
         const Motion<S> dV = cross(d.V[p], d.J[k]);
         dVdq[k] = dV.ang;
-        dAdq[k] = cross(d.A[p], d.J[k]) + cross(d.V[p], dV);
+        dAdq[k] = cross_add(d.A[p], d.J[k], cross(d.V[p], dV));
         dAdv[k] = dV * S(2.0);  // V_i x J = V_p x J: J is a single column
       }
     }
@@ -73,10 +73,10 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
     const int i = tree.joint[k];
     const Motion<S>& J = d.J[k];
     // column k, rows towards the root: J_j . dF_k
-    const Force<S> dFdv = d.Yc[i] * dAdv[k] + C[i].times(J.ang);
-    const Force<S> dFdq = d.Yc[i] * dAdq[k] + C[i].times(dVdq[k]);
+    const Force<S> dFdv = C[i].times_add(J.ang, d.Yc[i] * dAdv[k]);
+    const Force<S> dFdq = C[i].times_add(dVdq[k], d.Yc[i] * dAdq[k]);
     // seen from the joints before i the force f turns with dof k
-    const Force<S> dFdq_turned = dFdq + cross(J, f[i]);
+    const Force<S> dFdq_turned = cross_add(J, f[i], dFdq);
     for (int j = k; j >= 0; j = tree.parent[j]) {
       dtau_dv(j, k) = dot(d.J[j], dFdv);
       dtau_dq(j, k) = dot(d.J[j], tree.joint[j] == i ? dFdq : dFdq_turned);
@@ -85,8 +85,8 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
     const Force<S> F = d.Yc[i] * J;
     const Vec3<S> g = C[i].transposed_times(J);
     for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) {
-      dtau_dv(k, j) = dot(dAdv[j], F) + dot(g, d.J[j].ang);
-      dtau_dq(k, j) = dot(dAdq[j], F) + dot(g, dVdq[j]);
+      dtau_dv(k, j) = dot_add(g, d.J[j].ang, dot(dAdv[j], F));
+      dtau_dq(k, j) = dot_add(g, dVdq[j], dot(dAdq[j], F));
     }
     // hand the subtree on once the first dof of joint i is done
     if (const int p = R::parent[i]; p >= 0 && k == R::iv[i]) {
@@ -100,7 +100,7 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
 template <class R, class S> inline void rbd_solve_rows(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& X) {
   constexpr const Tree<R>& tree = kTree<R>;
   const auto subtract_row = [&X](int to, S l, int from) {
-    for (int c = 0; c < R::nv; ++c) X(to, c) -= l * X(from, c);
+    for (int c = 0; c < R::nv; ++c) X(to, c) = nmadd(l, X(from, c), X(to, c));
   };
   for (int k = R::nv - 1; k >= 0; --k) {
     for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) subtract_row(j, d.L(k, j), k);
@@ -119,10 +119,10 @@ inline void rbd_forward_derivatives(const S* /*q*/, const S* /*v*/, const S* /*t
   // accelerations and forces are affine in a: add J a and Y J a
   Motion<S> dA[R::nj];
   for (int i = 0; i < R::nj; ++i) {
-    dA[i] = rbd_joint_motion(d, i, a);
-    if (const int p = R::parent[i]; p >= 0) dA[i] += dA[p];
+    const int p = R::parent[i];
+    dA[i] = rbd_add_joint_motion(d, i, a, p < 0 ? Motion<S>::zero() : dA[p]);
     d.A[i] += dA[i];
-    d.f[i] += d.Y[i] * dA[i];
+    d.f[i] = mul_add(d.Y[i], dA[i], d.f[i]);
   }
   rbd_rnea_derivatives(d, da_dq, da_dv);
   for (int i = 0; i < R::nv; ++i) {
@@ -150,9 +150,9 @@ template <class R, class S> inline void rbd_gravity_derivatives(const RbdData<R,
     const Inertia<S>& Y = d.Yc[i];
     const Force<S> f = {up * Y.mass, cross(Y.moment, up)};
     const Force<S> dF = {dA[k] * Y.mass, cross(Y.moment, dA[k])};
-    const Force<S> dF_turned = dF + cross(J, f);
+    const Force<S> dF_turned = cross_add(J, f, dF);
     for (int j = k; j >= 0; j = tree.parent[j]) dg_dq(j, k) = dot(d.J[j], tree.joint[j] == i ? dF : dF_turned);
-    const Vec3<S> F = J.lin * Y.mass - cross(Y.moment, J.ang);
+    const Vec3<S> F = cross_add<S>(J.ang, Y.moment, J.lin * Y.mass);
     for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) dg_dq(k, j) = dot(F, dA[j]);
   }
 }

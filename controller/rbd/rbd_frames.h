@@ -9,7 +9,7 @@ namespace engram {
 // Placement of frame F in the world: axes R_WF, origin p_WF [m].
 template <class R, class S> inline void rbd_frame_placement(const RbdData<R, S>& d, int frame, Mat3<S>& R_WF, Vec3<S>& p_WF) {
   const int i = R::frame_joint[frame];
-  p_WF = d.p_WJ[i] + mul(d.R_WJ[i], constant3<S>(R::p_JF[frame]));
+  p_WF = mul_add(d.R_WJ[i], constant3<S>(R::p_JF[frame]), d.p_WJ[i]);
   R_WF = matmul(d.R_WJ[i], constant33<S>(R::R_JF[frame]));
 }
 
@@ -17,7 +17,7 @@ template <class R, class S> inline void rbd_frame_placement(const RbdData<R, S>&
 template <class R, class S> inline void rbd_point_jacobian(const RbdData<R, S>& d, int i, const Vec3<S>& p_W, Mat<S, 3, R::nv>& J) {
   J.setZero();
   for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
-    J.col(k) = d.J[k].lin + cross(d.J[k].ang, p_W);
+    J.col(k) = cross_add(d.J[k].ang, p_W, d.J[k].lin);
   }
 }
 
@@ -28,7 +28,7 @@ inline void rbd_frame_jacobian(const RbdData<R, S>& d, int frame, const Vec3<S>&
   const int i = R::frame_joint[frame];
   J.setZero();
   for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
-    J.template block<3, 1>(0, k) = d.J[k].lin + cross(d.J[k].ang, p_WF);
+    J.template block<3, 1>(0, k) = cross_add(d.J[k].ang, p_WF, d.J[k].lin);
     J.template block<3, 1>(3, k) = d.J[k].ang;
   }
 }
@@ -40,20 +40,20 @@ inline void rbd_frame_jacobian_local(const RbdData<R, S>& d, int frame, const Ma
   const int i = R::frame_joint[frame];
   J.setZero();
   for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
-    J.template block<3, 1>(0, k) = mul_transposed<S>(R_WF, d.J[k].lin + cross(d.J[k].ang, p_WF));
+    J.template block<3, 1>(0, k) = mul_transposed<S>(R_WF, cross_add(d.J[k].ang, p_WF, d.J[k].lin));
     J.template block<3, 1>(3, k) = mul_transposed<S>(R_WF, d.J[k].ang);
   }
 }
 
 // Velocity [m/s] in world axes of the point p_W fixed to joint i. After rbd_velocity.
 template <class R, class S> inline Vec3<S> rbd_point_velocity(const RbdData<R, S>& d, int i, const Vec3<S>& p_W) {
-  return d.V[i].lin + cross(d.V[i].ang, p_W);
+  return cross_add(d.V[i].ang, p_W, d.V[i].lin);
 }
 
 // Centre of collision sphere s in the world [m].
 template <class R, class S> inline Vec3<S> rbd_sphere_position(const RbdData<R, S>& d, int s) {
   const int i = R::sphere_joint[s];
-  return d.p_WJ[i] + mul(d.R_WJ[i], constant3<S>(R::p_JS[s]));
+  return mul_add(d.R_WJ[i], constant3<S>(R::p_JS[s]), d.p_WJ[i]);
 }
 
 }  // namespace engram

@@ -38,9 +38,9 @@ template <class S> inline Mat3<S> rotation_of(const S* quat) {
   const S x = quat[0], y = quat[1], z = quat[2], w = quat[3];
   const S x2 = x + x, y2 = y + y, z2 = z + z;
   Mat3<S> R;
-  R << 1.0 - (y * y2 + z * z2), x * y2 - w * z2, x * z2 + w * y2,  //
-      x * y2 + w * z2, 1.0 - (x * x2 + z * z2), y * z2 - w * x2,   //
-      x * z2 - w * y2, y * z2 + w * x2, 1.0 - (x * x2 + y * y2);
+  R << nmadd(y, y2, nmadd(z, z2, S(1.0))), msub(x, y2, w * z2), madd(x, z2, w * y2),  //
+      madd(x, y2, w * z2), nmadd(x, x2, nmadd(z, z2, S(1.0))), msub(y, z2, w * x2),   //
+      msub(x, z2, w * y2), madd(y, z2, w * x2), nmadd(x, x2, nmadd(y, y2, S(1.0)));
   return R;
 }
 
@@ -51,7 +51,7 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
     Mat3<S> R_WJ = constant33<S>(R::R_PJ[i]);
     Vec3<S> p_WJ = constant3<S>(R::p_PJ[i]);
     if (const int p = R::parent[i]; p >= 0) {
-      p_WJ = d.p_WJ[p] + mul(d.R_WJ[p], p_WJ);
+      p_WJ = mul_add(d.R_WJ[p], p_WJ, d.p_WJ[p]);
       R_WJ = matmul(d.R_WJ[p], R_WJ);
     }
     const S* qi = q + R::iq[i];
@@ -61,19 +61,19 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
         S s, c;
         sincos(qi[0], s, c);
         const Vec3<S> x = R_WJ.col(0), y = R_WJ.col(1), z = R_WJ.col(2);
-        R_WJ.col(0) = x * c + y * s;
-        R_WJ.col(1) = y * c - x * s;
+        R_WJ.col(0) = madd<S>(x, c, y * s);
+        R_WJ.col(1) = madd<S>(y, c, x * -s);
         J[0] = {cross(p_WJ, z), z};
         break;
       }
       case kPrismatic: {
         const Vec3<S> z = R_WJ.col(2);
-        p_WJ += z * qi[0];
+        p_WJ = madd(z, qi[0], p_WJ);
         J[0] = {z, Vec3<S>::Zero()};
         break;
       }
       case kFree: {
-        p_WJ += mul(R_WJ, Vec3<S>(qi[0], qi[1], qi[2]));
+        p_WJ = mul_add(R_WJ, Vec3<S>(qi[0], qi[1], qi[2]), p_WJ);
         R_WJ = matmul(R_WJ, rotation_of(qi + 3));
         for (int k = 0; k < 3; ++k) {
           const Vec3<S> e = R_WJ.col(k);
@@ -88,13 +88,9 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
   }
 }
 
-// sum_k J_k x_k over the dofs of joint i
-template <class R, class S> inline Motion<S> rbd_joint_motion(const RbdData<R, S>& d, int i, const S* x) {
-  const int k = R::iv[i];
-  Motion<S> m = d.J[k] * x[k];
-  if (R::kind[i] == kFree) {
-    for (int l = 1; l < 6; ++l) m += d.J[k + l] * x[k + l];
-  }
+// m + sum_k J_k x_k over the dofs of joint i
+template <class R, class S> inline Motion<S> rbd_add_joint_motion(const RbdData<R, S>& d, int i, const S* x, Motion<S> m) {
+  for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) m = madd(d.J[k], x[k], m);
   return m;
 }
 
@@ -102,8 +98,7 @@ template <class R, class S> inline Motion<S> rbd_joint_motion(const RbdData<R, S
 template <class R, class S> inline void rbd_velocity(const S* v, RbdData<R, S>& d) {
   for (int i = 0; i < R::nj; ++i) {
     const int p = R::parent[i];
-    d.V[i] = rbd_joint_motion(d, i, v);
-    if (p >= 0) d.V[i] += d.V[p];
+    d.V[i] = rbd_add_joint_motion(d, i, v, p < 0 ? Motion<S>::zero() : d.V[p]);
   }
 }
 

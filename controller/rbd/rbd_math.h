@@ -9,7 +9,7 @@ namespace engram {
 // c[0] + c[1] x + ... + c[n-1] x^(n-1) by Horner's rule
 template <class S, int n> inline S polynomial(S x, const double (&c)[n]) {
   S y = S(c[n - 1]);
-  for (int i = n - 2; i >= 0; --i) y = y * x + c[i];
+  for (int i = n - 2; i >= 0; --i) y = madd(y, x, S(c[i]));
   return y;
 }
 
@@ -17,17 +17,20 @@ template <class S, int n> inline S polynomial(S x, const double (&c)[n]) {
 // Cody-Waite: a = n pi/2 + r with pi/2 in three parts, |r| <= pi/4; then the minimax polynomials of fdlibm (Sun, 1993).
 template <class S> inline void sincos(S a, S& s, S& c) {
   constexpr double kRound = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
-  const S shifted = a * (2.0 / 3.14159265358979323846) + kRound;
+  const S shifted = madd(a, S(2.0 / 3.14159265358979323846), S(kRound));
   const S n = shifted - kRound;
-  const S r = ((a - n * 1.57079632673412561417) - n * 6.07710050630396597660e-11) - n * 2.02226624879595063154e-21;
+  S r = nmadd(n, S(1.57079632673412561417), a);
+  r = nmadd(n, S(6.07710050630396597660e-11), r);
+  r = nmadd(n, S(2.02226624879595063154e-21), r);
   const S z = r * r;
-  const S half_z = 0.5 * z;
-  const S w = 1.0 - half_z;
-  const S sin_r = r + r * z * polynomial(z, {-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
-                                             2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10});
-  const S cos_r = w + (((1.0 - w) - half_z) +
-                       z * z * polynomial(z, {4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
-                                              -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11}));
+  const S sin_p = polynomial(z, {-1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
+                                 2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10});
+  const S cos_p = polynomial(z, {4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.48015872894767294178e-05,
+                                 -2.75573143513906633035e-07, 2.08757232129817482790e-09, -1.13596475577881948265e-11});
+  const S sin_r = madd(r * z, sin_p, r);
+  // 1 - z/2 rounds; what it lost is (1 - w) - z/2
+  const S w = nmadd(S(0.5), z, S(1.0));
+  const S cos_r = w + madd(z * z, cos_p, nmadd(S(0.5), z, 1.0 - w));
   // quadrant n mod 4: sine and cosine change places when odd; signs from bit 1 of n and n + 1
   const auto quadrant = to_bits(shifted);
   const auto odd = (quadrant & 1) != 0;
@@ -45,12 +48,12 @@ template <class S> inline S atan2_first_quadrant(S y, S x, S& per_y) {
   const S offset = select(near_y, S(kHalfPi), select(between, S(kQuarterPi), S(0.0)));
   const S t = numerator / denominator;
   const S z = t * t;
-  const S ratio = 1.0 + z *
-                            polynomial(z, {-6.485021904942025371773e1, -1.228866684490136173410e2, -7.500855792314704667340e1,
-                                           -1.615753718733365076637e1, -8.750608600031904122785e-1}) /
-                            polynomial(z, {1.945506571482613964425e2, 4.853903996359136964868e2, 4.328810604912902668951e2,
-                                           1.650270098316988542046e2, 2.485846490142306297962e1, 1.0});
-  const S angle = offset + t * ratio;
+  const S P = polynomial(z, {-6.485021904942025371773e1, -1.228866684490136173410e2, -7.500855792314704667340e1,
+                             -1.615753718733365076637e1, -8.750608600031904122785e-1});
+  const S Q = polynomial(z, {1.945506571482613964425e2, 4.853903996359136964868e2, 4.328810604912902668951e2,
+                             1.650270098316988542046e2, 2.485846490142306297962e1, 1.0});
+  const S ratio = madd(z, P / Q, S(1.0));
+  const S angle = madd(t, ratio, offset);
   per_y = select(between, angle, ratio) / select(between, y, x);
   return angle;
 }

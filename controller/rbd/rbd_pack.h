@@ -56,6 +56,21 @@ inline double from_bits(int64_t b) { double a; std::memcpy(&a, &b, sizeof a); re
 inline Pack::Mask to_bits(Pack a) { return reinterpret_cast<Pack::Mask>(a.l); }
 inline Pack from_bits(Pack::Mask b) { return Pack(reinterpret_cast<Pack::Lanes>(b)); }
 
+// a b + c, c - a b and a b - c with one rounding. Said aloud rather than left to the compiler, so that every lane, and the scalar,
+// round alike.
+#ifdef __FP_FAST_FMA
+inline double madd(double a, double b, double c) { return __builtin_fma(a, b, c); }
+#else
+inline double madd(double a, double b, double c) { return a * b + c; }
+#endif
+inline Pack madd(Pack a, Pack b, Pack c) {
+  Pack r;
+  for (int i = 0; i < kLanes; ++i) r.l[i] = madd(a.l[i], b.l[i], c.l[i]);
+  return r;
+}
+template <class S> inline S nmadd(S a, S b, S c) { return madd(-a, b, c); }
+template <class S> inline S msub(S a, S b, S c) { return madd(a, b, -c); }
+
 inline double sqrt(double a) { return std::sqrt(a); }
 inline Pack sqrt(Pack a) {
   Pack r;

@@ -14,10 +14,10 @@ namespace engram {
 template <class R, class S> inline void rbd_body_forces(const S* a, RbdData<R, S>& d) {
   for (int i = 0; i < R::nj; ++i) {
     const int p = R::parent[i];
-    Motion<S> A = p < 0 ? rbd_gravity_acceleration<R, S>() : d.A[p] + cross(d.V[p], d.V[i]);
-    if (a != nullptr) A += rbd_joint_motion(d, i, a);
+    Motion<S> A = p < 0 ? rbd_gravity_acceleration<R, S>() : cross_add(d.V[p], d.V[i], d.A[p]);
+    if (a != nullptr) A = rbd_add_joint_motion(d, i, a, A);
     d.A[i] = A;
-    d.f[i] = d.Y[i] * A + cross(d.V[i], d.Y[i] * d.V[i]);
+    d.f[i] = cross_add(d.V[i], d.Y[i] * d.V[i], d.Y[i] * A);
   }
 }
 
@@ -39,7 +39,7 @@ template <class R, class S> inline void rbd_rnea(const S* q, const S* v, const S
   rbd_inertias(d);
   rbd_body_forces(a, d);
   rbd_project_forces(d, tau);
-  for (int k = 0; k < R::nv; ++k) tau[k] += R::armature[k] * a[k];
+  for (int k = 0; k < R::nv; ++k) tau[k] = madd(S(R::armature[k]), a[k], tau[k]);
 }
 
 // Gravity forces g(q) (nv): what holds the robot still. After rbd_kinematics.
@@ -47,7 +47,7 @@ template <class R, class S> inline void rbd_rnea(const S* q, const S* v, const S
 template <class R, class S> inline void rbd_gravity(RbdData<R, S>& d, S* g) {
   const Vec3<S> up = -constant3<S>(R::gravity);
   for (int i = 0; i < R::nj; ++i) {
-    const Vec3<S> c = d.p_WJ[i] + mul(d.R_WJ[i], constant3<S>(R::com[i]));
+    const Vec3<S> c = mul_add(d.R_WJ[i], constant3<S>(R::com[i]), d.p_WJ[i]);
     d.Yc[i].mass = S(R::mass[i]);
     d.Yc[i].moment = c * S(R::mass[i]);
   }

@@ -1,8 +1,8 @@
-// Spatial algebra over a scalar S, every quantity at the world origin in world axes: nothing has to be moved between links, a
-// sum over a subtree is a plain sum. Linear part first, as in q, v and J.
+// Spatial algebra over a scalar S, every quantity at the world origin in world axes: nothing has to be moved between links, and the
+// inertia or force of a subtree is a plain sum. Linear part first, as in q, v and J.
 // Source: Featherstone, Rigid Body Dynamics Algorithms (2008), chapter 2.
 //
-// Products are spelled out so that double and Pack round alike, whatever vectorisation Eigen would pick for double.
+// Products are chains of fused multiply-adds, spelled out: the fewest instructions, and the same rounding for double and Pack.
 #ifndef CONTROLLER_RBD_RBD_SPATIAL_H_
 #define CONTROLLER_RBD_RBD_SPATIAL_H_
 
@@ -10,32 +10,55 @@
 
 namespace engram {
 
-template <class S> inline S dot(const Vec3<S>& a, const Vec3<S>& b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+// ---- 3-vectors and 3x3 matrices ----
 
+template <class S> inline S dot(const Vec3<S>& a, const Vec3<S>& b) { return madd(a[0], b[0], madd(a[1], b[1], a[2] * b[2])); }
+// c + a . b
+template <class S> inline S dot_add(const Vec3<S>& a, const Vec3<S>& b, S c) {
+  return madd(a[0], b[0], madd(a[1], b[1], madd(a[2], b[2], c)));
+}
+
+// a x b
 template <class S> inline Vec3<S> cross(const Vec3<S>& a, const Vec3<S>& b) {
-  return Vec3<S>(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]);
+  return {msub(a[1], b[2], a[2] * b[1]), msub(a[2], b[0], a[0] * b[2]), msub(a[0], b[1], a[1] * b[0])};
+}
+// c + a x b
+template <class S> inline Vec3<S> cross_add(const Vec3<S>& a, const Vec3<S>& b, const Vec3<S>& c) {
+  return {madd(a[1], b[2], nmadd(a[2], b[1], c[0])), madd(a[2], b[0], nmadd(a[0], b[2], c[1])),
+          madd(a[0], b[1], nmadd(a[1], b[0], c[2]))};
 }
 
-// y = A x
+// a s + b
+template <class S> inline Vec3<S> madd(const Vec3<S>& a, S s, const Vec3<S>& b) {
+  return {madd(a[0], s, b[0]), madd(a[1], s, b[1]), madd(a[2], s, b[2])};
+}
+
+// A x, written as a sum of columns
 template <class S> inline Vec3<S> mul(const Mat3<S>& A, const Vec3<S>& x) {
-  return Vec3<S>(A(0, 0) * x[0] + A(0, 1) * x[1] + A(0, 2) * x[2], A(1, 0) * x[0] + A(1, 1) * x[1] + A(1, 2) * x[2],
-                 A(2, 0) * x[0] + A(2, 1) * x[1] + A(2, 2) * x[2]);
+  const auto row = [&](int i) { return madd(A(i, 0), x[0], madd(A(i, 1), x[1], A(i, 2) * x[2])); };
+  return {row(0), row(1), row(2)};
 }
-
-// y = A' x
+// y + A x
+template <class S> inline Vec3<S> mul_add(const Mat3<S>& A, const Vec3<S>& x, const Vec3<S>& y) {
+  const auto row = [&](int i) { return madd(A(i, 0), x[0], madd(A(i, 1), x[1], madd(A(i, 2), x[2], y[i]))); };
+  return {row(0), row(1), row(2)};
+}
+// A' x and y + A' x
 template <class S> inline Vec3<S> mul_transposed(const Mat3<S>& A, const Vec3<S>& x) {
-  return Vec3<S>(A(0, 0) * x[0] + A(1, 0) * x[1] + A(2, 0) * x[2], A(0, 1) * x[0] + A(1, 1) * x[1] + A(2, 1) * x[2],
-                 A(0, 2) * x[0] + A(1, 2) * x[1] + A(2, 2) * x[2]);
+  const auto row = [&](int i) { return madd(A(0, i), x[0], madd(A(1, i), x[1], A(2, i) * x[2])); };
+  return {row(0), row(1), row(2)};
+}
+template <class S> inline Vec3<S> mul_transposed_add(const Mat3<S>& A, const Vec3<S>& x, const Vec3<S>& y) {
+  const auto row = [&](int i) { return madd(A(0, i), x[0], madd(A(1, i), x[1], madd(A(2, i), x[2], y[i]))); };
+  return {row(0), row(1), row(2)};
 }
 
-// C = A B
+// A B and A' B
 template <class S> inline Mat3<S> matmul(const Mat3<S>& A, const Mat3<S>& B) {
   Mat3<S> C;
   for (int j = 0; j < 3; ++j) C.col(j) = mul<S>(A, B.col(j));
   return C;
 }
-
-// C = A' B
 template <class S> inline Mat3<S> matmul_transposed(const Mat3<S>& A, const Mat3<S>& B) {
   Mat3<S> C;
   for (int j = 0; j < 3; ++j) C.col(j) = mul_transposed<S>(A, B.col(j));
@@ -49,6 +72,14 @@ template <class S> inline Mat3<S> skew(const Vec3<S>& a) {
   return A;
 }
 
+// Symmetric 3x3 as xx xy xz yy yz zz: y + A x
+template <class S> inline Vec3<S> mul_symmetric_add(const S* A, const Vec3<S>& x, const Vec3<S>& y) {
+  return {madd(A[0], x[0], madd(A[1], x[1], madd(A[2], x[2], y[0]))), madd(A[1], x[0], madd(A[3], x[1], madd(A[4], x[2], y[1]))),
+          madd(A[2], x[0], madd(A[4], x[1], madd(A[5], x[2], y[2])))};
+}
+
+// ---- spatial vectors ----
+
 // Velocity, acceleration, or a Jacobian column: (u, w).
 template <class S> struct Motion {
   Vec3<S> lin, ang;
@@ -58,6 +89,8 @@ template <class S> struct Motion {
   friend Motion operator+(Motion a, const Motion& b) { return a += b; }
   friend Motion operator-(const Motion& a, const Motion& b) { return {a.lin - b.lin, a.ang - b.ang}; }
   friend Motion operator*(const Motion& a, S s) { return {a.lin * s, a.ang * s}; }
+  // a s + b
+  friend Motion madd(const Motion& a, S s, const Motion& b) { return {madd(a.lin, s, b.lin), madd(a.ang, s, b.ang)}; }
 };
 
 // Force or momentum: (f, n), n about the world origin.
@@ -69,23 +102,31 @@ template <class S> struct Force {
   friend Force operator+(Force a, const Force& b) { return a += b; }
   friend Force operator-(const Force& a, const Force& b) { return {a.lin - b.lin, a.ang - b.ang}; }
   friend Force operator*(const Force& a, S s) { return {a.lin * s, a.ang * s}; }
+  friend Force madd(const Force& a, S s, const Force& b) { return {madd(a.lin, s, b.lin), madd(a.ang, s, b.ang)}; }
 };
 
 // m . f (power)
-template <class S> inline S dot(const Motion<S>& m, const Force<S>& f) { return dot(m.lin, f.lin) + dot(m.ang, f.ang); }
+template <class S> inline S dot(const Motion<S>& m, const Force<S>& f) { return dot_add(m.lin, f.lin, dot(m.ang, f.ang)); }
 
-// a x b = (w_a x u_b + u_a x w_b, w_a x w_b)
+// a x b = (w_a x u_b + u_a x w_b, w_a x w_b), and c + a x b
 template <class S> inline Motion<S> cross(const Motion<S>& a, const Motion<S>& b) {
-  return {cross(a.ang, b.lin) + cross(a.lin, b.ang), cross(a.ang, b.ang)};
+  return {cross_add(a.ang, b.lin, cross(a.lin, b.ang)), cross(a.ang, b.ang)};
+}
+template <class S> inline Motion<S> cross_add(const Motion<S>& a, const Motion<S>& b, const Motion<S>& c) {
+  return {cross_add(a.ang, b.lin, cross_add(a.lin, b.ang, c.lin)), cross_add(a.ang, b.ang, c.ang)};
 }
 
-// m x* f = (w x f, w x n + u x f)
+// m x* f = (w x f, w x n + u x f), and c + m x* f
 template <class S> inline Force<S> cross(const Motion<S>& m, const Force<S>& f) {
-  return {cross(m.ang, f.lin), cross(m.ang, f.ang) + cross(m.lin, f.lin)};
+  return {cross(m.ang, f.lin), cross_add(m.ang, f.ang, cross(m.lin, f.lin))};
 }
+template <class S> inline Force<S> cross_add(const Motion<S>& m, const Force<S>& f, const Force<S>& c) {
+  return {cross_add(m.ang, f.lin, c.lin), cross_add(m.ang, f.ang, cross_add(m.lin, f.lin, c.ang))};
+}
+
+// ---- inertia ----
 
 // Mass, first moment m c [kg m] and rotational inertia about the world origin [kg m^2] as xx xy xz yy yz zz.
-// A subtree's inertia is the sum of its bodies'.
 template <class S> struct Inertia {
   S mass;
   Vec3<S> moment;
@@ -97,39 +138,36 @@ template <class S> struct Inertia {
     for (int i = 0; i < 6; ++i) I[i] += b.I[i];
     return *this;
   }
+  // Y a = (m u + w x mc, I w + mc x u), and f + Y a
+  friend Force<S> operator*(const Inertia& Y, const Motion<S>& a) { return mul_add(Y, a, Force<S>::zero()); }
+  friend Force<S> mul_add(const Inertia& Y, const Motion<S>& a, const Force<S>& f) {
+    return {cross_add(a.ang, Y.moment, madd(a.lin, Y.mass, f.lin)),
+            cross_add(Y.moment, a.lin, mul_symmetric_add(Y.I, a.ang, f.ang))};
+  }
 };
 
-template <class S> inline Vec3<S> mul_symmetric(const S* I, const Vec3<S>& w) {
-  return Vec3<S>(I[0] * w[0] + I[1] * w[1] + I[2] * w[2], I[1] * w[0] + I[3] * w[1] + I[4] * w[2],
-                 I[2] * w[0] + I[4] * w[1] + I[5] * w[2]);
-}
-
-// Y a = (m u - mc x w, I w + mc x u)
-template <class S> inline Force<S> operator*(const Inertia<S>& Y, const Motion<S>& a) {
-  return {a.lin * Y.mass - cross(Y.moment, a.ang), mul_symmetric(Y.I, a.ang) + cross(Y.moment, a.lin)};
-}
-
-// Inertia at the world origin of a body with rotation R_WJ, position p_WJ; constants `com` and `inertia` (about the com) in its axes:
+// Inertia of a body with axes R_WJ and origin p_WJ; constants in its axes: `com`, and `inertia` about the com (xx xy xz yy yz zz).
 //   I = R Ic R' + m (|c|^2 1 - c c')
 template <class S>
 inline Inertia<S> inertia_in_world(const Mat3<S>& R_WJ, const Vec3<S>& p_WJ, double mass, const double* com, const double* inertia) {
-  const double Ic[3][3] = {{inertia[0], inertia[1], inertia[2]}, {inertia[1], inertia[3], inertia[4]}, {inertia[2], inertia[4], inertia[5]}};
-  Mat3<S> T;  // R Ic
+  const Vec3<S> c = mul_add(R_WJ, constant3<S>(com), p_WJ), mc = c * S(mass);
+  const S Ic[6] = {S(inertia[0]), S(inertia[1]), S(inertia[2]), S(inertia[3]), S(inertia[4]), S(inertia[5])};
+  const Vec3<S> none = Vec3<S>::Zero();
+  Vec3<S> r[3], T[3];  // rows of R and of R Ic
   for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) T(i, j) = R_WJ(i, 0) * Ic[0][j] + R_WJ(i, 1) * Ic[1][j] + R_WJ(i, 2) * Ic[2][j];
+    r[i] = R_WJ.row(i).transpose();
+    T[i] = mul_symmetric_add(Ic, r[i], none);
   }
-  const auto rotated = [&](int i, int j) { return T(i, 0) * R_WJ(j, 0) + T(i, 1) * R_WJ(j, 1) + T(i, 2) * R_WJ(j, 2); };
-  const Vec3<S> c = p_WJ + R_WJ.col(0) * S(com[0]) + R_WJ.col(1) * S(com[1]) + R_WJ.col(2) * S(com[2]);
+  const S zz = mc[2] * c[2];
   Inertia<S> Y;
   Y.mass = S(mass);
-  Y.moment = c * S(mass);
-  const S xx = Y.moment[0] * c[0], yy = Y.moment[1] * c[1], zz = Y.moment[2] * c[2];
-  Y.I[0] = rotated(0, 0) + (yy + zz);
-  Y.I[1] = rotated(0, 1) - Y.moment[0] * c[1];
-  Y.I[2] = rotated(0, 2) - Y.moment[0] * c[2];
-  Y.I[3] = rotated(1, 1) + (xx + zz);
-  Y.I[4] = rotated(1, 2) - Y.moment[1] * c[2];
-  Y.I[5] = rotated(2, 2) + (xx + yy);
+  Y.moment = mc;
+  Y.I[0] = dot_add<S>(T[0], r[0], madd(mc[1], c[1], zz));
+  Y.I[1] = dot_add<S>(T[0], r[1], -(mc[0] * c[1]));
+  Y.I[2] = dot_add<S>(T[0], r[2], -(mc[0] * c[2]));
+  Y.I[3] = dot_add<S>(T[1], r[1], madd(mc[0], c[0], zz));
+  Y.I[4] = dot_add<S>(T[1], r[2], -(mc[1] * c[2]));
+  Y.I[5] = dot_add<S>(T[2], r[2], madd(mc[0], c[0], mc[1] * c[1]));
   return Y;
 }
 
