@@ -39,11 +39,10 @@ struct FddpOpts {
   double step_increase_reg = 0.01; // a step not longer than this increases it
   double gradient_zero = 1e-12;    // below this expected first-order gain any step is accepted
   double gap_zero = 1e-16;         // gaps below this count as closed
-  double (*clock)(void*) = nullptr;  // microseconds, for phase times and the deadline; null: neither
-  void* clock_context = nullptr;
+  double (*now_us)() = nullptr;    // clock for phase times and the deadline; null: neither
   double budget_us = 0.0;          // time budget from the start of the solve; 0: none
 
-  double now() const { return clock ? clock(clock_context) : 0.0; }
+  double now() const { return now_us ? now_us() : 0.0; }
 };
 inline constexpr int kMaxStepLengths = 12;
 
