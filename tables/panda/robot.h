@@ -12,7 +12,7 @@ namespace engram::robots {
 
 struct Panda {
   static constexpr char name[] = "panda";
-  static constexpr uint64_t digest = 0x4130a6112224d587;  // of the numbers below
+  static constexpr uint64_t digest = 0x4b18e6738c35f0dc;  // of the numbers below
   static constexpr int nj = 7, nq = 7, nv = 7, nu = 7;
 
   // tree: parent -1 is the world; iq, iv first index in q, v; the subtree of i is [i, i + nsub[i])
@@ -151,32 +151,32 @@ struct Panda {
   static constexpr int nsphere = 12;
   static constexpr int sphere_joint[12] = {2, 3, 3, 4, 4, 4, 5, 5, 6, 6, 6, 6};
   static constexpr double p_JS[12][3] = {
-    {0.0, 0.0, -0x1.999999999999ap-4},  // panda_joint3
-    {0.0, 0.0, 0.0},  // panda_joint4
-    {-0x1.47ae147ae147bp-4, 0x1.5c28f5c28f5c3p-4, 0.0},  // panda_joint4
-    {0.0, 0x1.47ae147ae147bp-6, -0x1.999999999999ap-3},  // panda_joint5
-    {0.0, 0x1.eb851eb851eb8p-5, -0x1.0a3d70a3d70a4p-3},  // panda_joint5
-    {0.0, 0x1.1eb851eb851ecp-4, -0x1.eb851eb851eb8p-5},  // panda_joint5
-    {0.0, 0.0, 0.0},  // panda_joint6
-    {0x1.6872b020c49bap-4, 0x1.47ae147ae147bp-7, 0.0},  // panda_joint6
-    {0x1.78852d0ff33f4p-5, 0x1.78852d0ff33f3p-5, 0x1.0e5604189374cp-3},  // panda_joint7
-    {-0x1.78852d0ff33f4p-5, -0x1.78852d0ff33f3p-5, 0x1.0e5604189374cp-3},  // panda_joint7
-    {0.0, 0.0, 0x1.04189374bc6a8p-3},  // panda_joint7
-    {0.0, 0.0, 0x1.9374bc6a7ef9ep-3},  // panda_joint7
+    {0x1.70a3d70a3d70ap-5, 0x1.eb851eb851eb8p-6, -0x1.999999999999ap-6},  // panda_joint3
+    {0.0, 0.0, 0x1.70a3d70a3d70ap-5},  // panda_joint4
+    {-0x1.4bc6a7ef9db23p-4, 0x1.4395810624dd3p-4, 0.0},  // panda_joint4
+    {0.0, 0x1.47ae147ae147bp-7, -0x1.c28f5c28f5c29p-3},  // panda_joint5
+    {0.0, 0x1.16872b020c49cp-4, -0x1.147ae147ae148p-3},  // panda_joint5
+    {0.0, 0x1.374bc6a7ef9dbp-4, -0x1.26e978d4fdf3bp-6},  // panda_joint5
+    {0.0, 0.0, 0x1.47ae147ae147bp-7},  // panda_joint6
+    {0x1.47ae147ae147bp-4, 0x1.47ae147ae147bp-7, 0.0},  // panda_joint6
+    {0x1.89374bc6a7efap-7, 0x1.89374bc6a7efap-7, 0x1.70a3d70a3d70ap-4},  // panda_joint7
+    {-0x1.89e5e83ff2a8ap-5, -0x1.89e5e83ff2a88p-5, 0x1.083126e978d5p-3},  // panda_joint7
+    {0x1.89e5e83ff2a8ap-5, 0x1.89e5e83ff2a88p-5, 0x1.083126e978d5p-3},  // panda_joint7
+    {0.0, 0.0, 0x1.83126e978d4fep-3},  // panda_joint7
   };
   static constexpr double sphere_radius[12] = {
-    0x1.47ae147ae147bp-4,  // panda_joint3
-    0x1.5c28f5c28f5c3p-4,  // panda_joint4
-    0x1.1eb851eb851ecp-4,  // panda_joint4
-    0x1.1eb851eb851ecp-4,  // panda_joint5
-    0x1.c28f5c28f5c29p-5,  // panda_joint5
-    0x1.c28f5c28f5c29p-5,  // panda_joint5
-    0x1.1eb851eb851ecp-4,  // panda_joint6
-    0x1.eb851eb851eb8p-5,  // panda_joint6
-    0x1.999999999999ap-5,  // panda_joint7
-    0x1.999999999999ap-5,  // panda_joint7
-    0x1.999999999999ap-5,  // panda_joint7
-    0x1.eb851eb851eb8p-6,  // panda_joint7
+    0x1.851eb851eb852p-4,  // panda_joint3
+    0x1.16872b020c49cp-4,  // panda_joint4
+    0x1.16872b020c49cp-4,  // panda_joint4
+    0x1.0a3d70a3d70a4p-4,  // panda_joint5
+    0x1.eb851eb851eb8p-5,  // panda_joint5
+    0x1.0e5604189374cp-4,  // panda_joint5
+    0x1.c28f5c28f5c29p-5,  // panda_joint6
+    0x1.26e978d4fdf3bp-4,  // panda_joint6
+    0x1.16872b020c49cp-4,  // panda_joint7
+    0x1.89374bc6a7efap-5,  // panda_joint7
+    0x1.89374bc6a7efap-5,  // panda_joint7
+    0x1.26e978d4fdf3bp-5,  // panda_joint7
   };
 };
 
