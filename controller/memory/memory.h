@@ -10,7 +10,7 @@
 #ifndef CONTROLLER_MEMORY_MEMORY_H_
 #define CONTROLLER_MEMORY_MEMORY_H_
 
-#include "controller/rbd/rbd_types.h"
+#include "controller/ocp/ocp_reach.h"
 #include "controller/tab/tab_gpr.h"
 #include "controller/tab/tab_knn.h"
 #include "controller/tab/tab_logit.h"
@@ -32,12 +32,6 @@ struct MemoryTables {
 };
 
 enum class GuessKind : int32_t { kNeighbour, kRegression, kLine };
-
-// What the hand shall reach: target frame T in the world.
-struct MemoryGoal {
-  double p_WT[3];  // [m]
-  double R_WT[9];  // row-major
-};
 
 inline constexpr int kMemoryNeighbours = 10;                    // most neighbours of a query
 inline constexpr int kMemoryLines = 3;                          // to the best neighbour's posture, from home, from here
@@ -87,7 +81,7 @@ template <class Task> struct MemoryWork;
 // Guesses come in the order neighbours (nearest first), regression, lines; refused ones are left out. An x0, goal or t that is not
 // finite gives no guess. Defined in memory_query.h.
 template <class Task>
-void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const MemoryGoal& goal, const double* x0, int n,
+void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, int n,
                   const double* t, MemoryWork<Task>& work, MemoryAnswer<Task>& answer);
 
 }  // namespace engram

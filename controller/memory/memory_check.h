@@ -1,0 +1,32 @@
+// Start-up check of a memory's tables.
+#ifndef CONTROLLER_MEMORY_MEMORY_CHECK_H_
+#define CONTROLLER_MEMORY_MEMORY_CHECK_H_
+
+#include "controller/memory/memory_features.h"
+
+namespace engram {
+
+template <class Task> TabStatus memory_check(const MemoryTables& tables, char* text) {
+  using R = typename Task::Robot;
+  const auto head = [](const auto* table) { return table ? &table->head : nullptr; };
+  const struct {
+    const TabHead* head;
+    TabKind kind;
+  } expected[] = {{head(tables.knn), kTabKnn}, {head(tables.gpr), kTabGpr}, {head(tables.pca), kTabPca},
+                  {head(tables.rbf), kTabRbf}, {head(tables.trust), kTabLogit}};
+  for (const auto& table : expected) {
+    if (tab_check(table.head, table.kind, R::digest, Task::digest, text) != kTabOk) return kTabBad;
+  }
+  const bool fit = tables.knn->d == kMemoryFeatures<Task> && tables.gpr->d == kMemoryFeatures<Task> &&
+                   tables.trust->d == kMemoryTrustInputs && tables.rbf->nchannel == R::nq + R::nu &&
+                   tables.pca->n == tables.rbf->k * tables.rbf->nchannel && tables.pca->m == tables.knn->m &&
+                   tables.pca->m == tables.gpr->m;
+  if (fit) return kTabOk;
+  constexpr char kMisfit[] = "the memory's tables do not fit each other; run 'make tables' and build again";
+  static_assert(sizeof kMisfit <= TAB_TEXT, "fits the caller's buffer");
+  for (size_t i = 0; i < sizeof kMisfit; ++i) text[i] = kMisfit[i];
+  return kTabBad;
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_MEMORY_MEMORY_CHECK_H_
