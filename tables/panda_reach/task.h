@@ -10,7 +10,7 @@ namespace engram::tasks {
 struct PandaReach {
   using Robot = robots::Panda;
   static constexpr char name[] = "panda_reach";
-  static constexpr uint64_t digest = 0xf82806b1d5afb45d;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0xbb18c6d901a644cb;  // of the numbers below and of the robot's
   static constexpr Robot::Frame frame = Robot::kHandTcp;  // shall reach the target
 
   // task vector, in the order of task_t.value
@@ -77,12 +77,12 @@ struct PandaReach {
     "shelf_right", "shelf_back", "box"};
   static constexpr double p_WO[8][3] = {
     {0x1.47ae147ae147bp-2, 0.0, -0x1.eb851eb851eb8p-6},  // table
-    {0x1.3d70a3d70a3d7p-1, 0.0, 0x1.1eb851eb851ecp-4},  // shelf_bottom
+    {0x1.3d70a3d70a3d7p-1, 0.0, 0x1.999999999999ap-5},  // shelf_bottom
     {0x1.3d70a3d70a3d7p-1, 0.0, 0x1.999999999999ap-2},  // shelf_middle
-    {0x1.3d70a3d70a3d7p-1, 0.0, 0x1.75c28f5c28f5cp-1},  // shelf_top
-    {0x1.3d70a3d70a3d7p-1, 0x1.7ae147ae147aep-2, 0x1.7ae147ae147aep-2},  // shelf_left
-    {0x1.3d70a3d70a3d7p-1, -0x1.7ae147ae147aep-2, 0x1.7ae147ae147aep-2},  // shelf_right
-    {0x1.947ae147ae148p-1, 0.0, 0x1.7ae147ae147aep-2},  // shelf_back
+    {0x1.3d70a3d70a3d7p-1, 0.0, 0x1.8p-1},  // shelf_top
+    {0x1.3d70a3d70a3d7p-1, 0x1.7ae147ae147aep-2, 0x1.851eb851eb852p-2},  // shelf_left
+    {0x1.3d70a3d70a3d7p-1, -0x1.7ae147ae147aep-2, 0x1.851eb851eb852p-2},  // shelf_right
+    {0x1.947ae147ae148p-1, 0.0, 0x1.851eb851eb852p-2},  // shelf_back
     {0x1.c28f5c28f5c29p-3, 0x1.0a3d70a3d70a4p-1, 0x1.eb851eb851eb8p-4},  // box
   };
   static constexpr double R_WO[8][9] = {
@@ -100,9 +100,9 @@ struct PandaReach {
     {0x1.47ae147ae147bp-3, 0x1.70a3d70a3d70ap-2, 0x1.47ae147ae147bp-7},  // shelf_bottom
     {0x1.47ae147ae147bp-3, 0x1.70a3d70a3d70ap-2, 0x1.47ae147ae147bp-7},  // shelf_middle
     {0x1.47ae147ae147bp-3, 0x1.70a3d70a3d70ap-2, 0x1.47ae147ae147bp-7},  // shelf_top
-    {0x1.47ae147ae147bp-3, 0x1.47ae147ae147bp-7, 0x1.7ae147ae147aep-2},  // shelf_left
-    {0x1.47ae147ae147bp-3, 0x1.47ae147ae147bp-7, 0x1.7ae147ae147aep-2},  // shelf_right
-    {0x1.47ae147ae147bp-7, 0x1.851eb851eb852p-2, 0x1.7ae147ae147aep-2},  // shelf_back
+    {0x1.47ae147ae147bp-3, 0x1.47ae147ae147bp-7, 0x1.851eb851eb852p-2},  // shelf_left
+    {0x1.47ae147ae147bp-3, 0x1.47ae147ae147bp-7, 0x1.851eb851eb852p-2},  // shelf_right
+    {0x1.47ae147ae147bp-7, 0x1.851eb851eb852p-2, 0x1.851eb851eb852p-2},  // shelf_back
     {0x1.eb851eb851eb8p-4, 0x1.999999999999ap-4, 0x1.eb851eb851eb8p-4},  // box
   };
 };
