@@ -21,7 +21,7 @@ test: setup
 	@scripts/test.sh
 
 bench: setup
-	@scripts/bench.sh
+	@.venv/bin/python bench/run.py $(ARGS)
 
 tables: setup
 	@scripts/tables.sh

@@ -93,8 +93,12 @@ pip_install() {
 
 setup_build() {
   configure build Release
-  say build "compiling into build/ (a few minutes the first time, seconds after that)"
-  compile build
+  if ninja -C build -n 2> /dev/null | grep -q 'no work to do'; then
+    say build "build/ is up to date"
+  else
+    say build "compiling into build/ (minutes the first time, seconds after that)"
+    compile build
+  fi
 }
 
 # LCM speaks UDP multicast; a machine without any network has no route for it, so the loopback interface gets one.
