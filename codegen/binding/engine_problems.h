@@ -1,0 +1,11 @@
+#ifndef CODEGEN_BINDING_ENGINE_PROBLEMS_H_
+#define CODEGEN_BINDING_ENGINE_PROBLEMS_H_
+
+#include <nanobind/nanobind.h>
+
+namespace engram::binding {
+
+void bind_arm(nanobind::module_& engine);
+
+}  // namespace engram::binding
+#endif  // CODEGEN_BINDING_ENGINE_PROBLEMS_H_
