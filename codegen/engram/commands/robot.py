@@ -37,7 +37,9 @@ def run(args: argparse.Namespace) -> int:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "robot.h").write_text(robot_header(tree), encoding="utf-8")
         (folder / "robot.xml").write_text(robot_mjcf(tree), encoding="utf-8")
-        print(f"robot:  {relative(folder)}/robot.h robot.xml  nq {tree.nq}  nv {tree.nv}  nu {tree.nu}  digest {tree.digest:016x}")
+        print(
+            f"robot:  {relative(folder)}/robot.h robot.xml  nq {tree.nq}  nv {tree.nv}  nu {tree.nu}  digest {tree.digest:016x}"
+        )
         if args.meshes:
             print(f"robot:  {write_meshes(spec, tree, args.build)}")
     return 0

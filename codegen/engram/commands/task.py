@@ -38,7 +38,8 @@ def run(args: argparse.Namespace) -> int:
     (folder / "task.h").write_text(task_header(spec), encoding="utf-8")
     scene = scene_mjcf(spec, args.tables / args.robot / "robot.xml", world, folder)
     (folder / "scene.xml").write_text(scene, encoding="utf-8")
-    print(f"task:   {relative(folder)}/task.h scene.xml  vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}  digest {spec.digest:016x}")
+    sizes = f"vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}"
+    print(f"task:   {relative(folder)}/task.h scene.xml  {sizes}  digest {spec.digest:016x}")
     if args.meshes:
         shown = args.build / "scene"
         if not (shown / f"{args.robot}.xml").is_file():

@@ -90,7 +90,11 @@ def _add_visuals(body: ElementTree.Element, visuals: list[Visual], joint: int) -
     """Shapes that are seen and never touched."""
     for visual in visuals:
         if visual.joint == joint:
-            shape = {"type": "mesh", "mesh": visual.name} if visual.kind == "mesh" else {"type": visual.kind, "size": words(visual.size)}
+            shape = (
+                {"type": "mesh", "mesh": visual.name}
+                if visual.kind == "mesh"
+                else {"type": visual.kind, "size": words(visual.size)}
+            )
             place = {"pos": words(visual.p_JG), "quat": quaternion(visual.R_JG)}
             look = {"rgba": words(visual.rgba), "group": str(GROUP_VISUAL), "contype": "0", "conaffinity": "0"}
             ElementTree.SubElement(body, "geom", **shape, **place, **look)

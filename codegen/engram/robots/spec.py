@@ -39,7 +39,9 @@ def known_robots(models: Path = MODELS) -> list[str]:
 def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
     """Read and check models/<name>/robot.toml. Raises InputError."""
     if name not in known_robots(models):
-        raise InputError(f"unknown robot '{name}'; {closest(name, known_robots(models))}; a new one needs models/{name}/robot.toml")
+        raise InputError(
+            f"unknown robot '{name}'; {closest(name, known_robots(models))}; a new one needs models/{name}/robot.toml"
+        )
     file = TomlFile(models / name / "robot.toml")
     data = file.data
     file.check_keys(data, KEYS, required=["free_base", "home", "frames"])
@@ -47,7 +49,7 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
         raise file.error("urdf", "give exactly one of 'urdf' (a path) and 'example_robot_data' (a name)")
     if not isinstance(data["free_base"], bool):
         raise file.error("free_base", "expected true or false")
-    for joint, table in data.get("joint", {}).items():
+    for table in data.get("joint", {}).values():
         file.check_keys(table, JOINT_KEYS)
         for key, value in table.items():
             file.numbers(key, value, ())

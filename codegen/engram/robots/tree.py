@@ -177,9 +177,7 @@ def q_to_pin(tree: Tree, q: np.ndarray) -> np.ndarray:
     q_pin = np.zeros(tree.model.nq)
     for i, joint in enumerate(tree.model.joints[1:]):
         part = q[tree.iq[i] : tree.iq[i] + (7 if tree.kind[i] == FREE else 1)]
-        q_pin[joint.idx_q : joint.idx_q + joint.nq] = (
-            [np.cos(part[0]), np.sin(part[0])] if tree.continuous[i] else part
-        )
+        q_pin[joint.idx_q : joint.idx_q + joint.nq] = [np.cos(part[0]), np.sin(part[0])] if tree.continuous[i] else part
     return q_pin
 
 
@@ -257,7 +255,9 @@ def _classify(spec: RobotSpec, name: str, joint: pin.JointModel) -> tuple[int, b
     ):
         if short == long:
             return kind, continuous, np.array(joint.extract().axis)
-    raise spec.file.error(name, f"joint '{name}' is a {short}; only free-flyer base, revolute, continuous and prismatic joints are known")
+    raise spec.file.error(
+        name, f"joint '{name}' is a {short}; only free-flyer base, revolute, continuous and prismatic joints are known"
+    )
 
 
 def _frame(spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link: str) -> tuple[int, np.ndarray, np.ndarray]:
@@ -279,7 +279,9 @@ def _check(spec: RobotSpec, tree: Tree) -> None:
         if tree.parent[i] >= i or (tree.parent[i] >= 0 and i >= tree.parent[i] + tree.nsub[tree.parent[i]]):
             raise spec.file.error(name, f"joint '{name}' is not in depth-first order")
         if tree.mass[i] <= 0.0 or np.linalg.eigvalsh(tree.inertia[i])[0] <= 0.0:
-            raise spec.file.error(name, f"the body moved by joint '{name}' has no mass or no inertia; lock the joint or mend the URDF")
+            raise spec.file.error(
+                name, f"the body moved by joint '{name}' has no mass or no inertia; lock the joint or mend the URDF"
+            )
         if lo >= hi:
             raise spec.file.error(name, f"joint '{name}': lower limit {lo:g} is not below upper limit {hi:g}")
         if not lo <= q <= hi:

@@ -39,7 +39,9 @@ class ReachSampler:
             q = self.solve(p_WT, R_WT, rng)
             if q is not None:
                 return p_WT, R_WT, q
-        raise InputError(f"region '{region.name}' of task '{self.spec.name}': no pose is in reach; move it or ask for less clearance")
+        raise InputError(
+            f"region '{region.name}' of task '{self.spec.name}': no pose is in reach; move it or ask for less clearance"
+        )
 
     def solve(self, p_WT: np.ndarray, R_WT: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
         """A posture within the limits that puts the frame at the pose with the asked clearance, or None."""
