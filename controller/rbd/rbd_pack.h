@@ -9,6 +9,9 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#ifdef __AVX__
+#include <immintrin.h>
+#endif
 
 namespace engram {
 
@@ -64,18 +67,30 @@ inline double madd(double a, double b, double c) { return __builtin_fma(a, b, c)
 inline double madd(double a, double b, double c) { return a * b + c; }
 #endif
 inline Pack madd(Pack a, Pack b, Pack c) {
+#if defined(__AVX512F__) && ENGRAM_LANES == 8
+  return Pack(Pack::Lanes(_mm512_fmadd_pd(a.l, b.l, c.l)));
+#elif defined(__FMA__) && ENGRAM_LANES == 4
+  return Pack(Pack::Lanes(_mm256_fmadd_pd(a.l, b.l, c.l)));
+#else
   Pack r;
   for (int i = 0; i < kLanes; ++i) r.l[i] = madd(a.l[i], b.l[i], c.l[i]);
   return r;
+#endif
 }
 template <class S> inline S nmadd(S a, S b, S c) { return madd(-a, b, c); }
 template <class S> inline S msub(S a, S b, S c) { return madd(a, b, -c); }
 
 inline double sqrt(double a) { return std::sqrt(a); }
 inline Pack sqrt(Pack a) {
+#if defined(__AVX512F__) && ENGRAM_LANES == 8
+  return Pack(Pack::Lanes(_mm512_sqrt_pd(a.l)));
+#elif defined(__AVX__) && ENGRAM_LANES == 4
+  return Pack(Pack::Lanes(_mm256_sqrt_pd(a.l)));
+#else
   Pack r;
   for (int i = 0; i < kLanes; ++i) r.l[i] = std::sqrt(a.l[i]);
   return r;
+#endif
 }
 inline double abs(double a) { return std::fabs(a); }
 inline Pack abs(Pack a) { return from_bits(to_bits(a) & INT64_MAX); }
