@@ -28,14 +28,15 @@ as_root() {
 installed() { [ "$(dpkg-query -W -f '${db:Status-Status}' "$1" 2> /dev/null)" = installed ]; }
 
 find_python() {
-  local candidate
-  for candidate in ${PYTHON:-} python3.11 python3 python3.12; do
+  local candidate candidates=(python3.11 python3 python3.12)
+  [ -z "${PYTHON:-}" ] || candidates=("$PYTHON")
+  for candidate in "${candidates[@]}"; do
     if "$candidate" -c 'import sys; raise SystemExit(not (3, 11) <= sys.version_info < (3, 13))' 2> /dev/null; then
       "$candidate" -c 'import sys; print(sys.executable)'
       return
     fi
   done
-  fail "no Python 3.11 found" "install it (apt-get install python3), or name one: PYTHON=/path/to/python3.11 make ..."
+  fail "no Python 3.11 or 3.12 in: ${candidates[*]}" "install it (apt-get install python3), or name one: PYTHON=/path/to/python3.11 make ..."
 }
 
 setup_packages() {
@@ -69,7 +70,7 @@ setup_python() {
   local python stamp log=build/logs/pip.log
   python=$(find_python)
   mkdir -p build/logs
-  stamp=$(content_hash requirements.txt requirements-peers.txt <("$python" -VV))
+  stamp=$(content_hash requirements.txt requirements-peers.txt <("$python" -VV; echo "$PWD"))
   if [ "$(cat .venv/stamp 2> /dev/null)" = "$stamp" ]; then
     say python "environment .venv is up to date"
   else
