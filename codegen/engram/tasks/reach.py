@@ -45,22 +45,24 @@ class ReachSampler:
 
     def solve(self, p_WT: np.ndarray, R_WT: np.ndarray, rng: np.random.Generator) -> np.ndarray | None:
         """A posture within the limits that puts the frame at the pose with the asked clearance, or None."""
-        target = pin.SE3(R_WT, p_WT)
         for _ in range(STARTS):
-            q = rng.uniform(self.lo, self.hi)
-            for _ in range(STEPS):
-                pin.computeJointJacobians(self.model, self.data, q)
-                error = self.data.oMi[self.joint].act(self.placement).actInv(target)
-                residual = pin.log6(error).vector
-                if np.abs(residual).max() < REACHED:
-                    break
-                J = self.placement.toActionMatrixInverse() @ pin.getJointJacobian(self.model, self.data, self.joint, pin.LOCAL)
-                J = pin.Jlog6(error.inverse()) @ J
-                q = np.clip(q + J.T @ np.linalg.solve(J @ J.T + DAMPING * np.eye(6), residual), self.lo, self.hi)
-            else:
-                continue
-            if self.clearance(q) >= self.spec.clearance:
+            q = self.descend(rng.uniform(self.lo, self.hi), p_WT, R_WT)
+            if q is not None and self.clearance(q) >= self.spec.clearance:
                 return q
+        return None
+
+    def descend(self, q: np.ndarray, p_WT: np.ndarray, R_WT: np.ndarray) -> np.ndarray | None:
+        """The posture within the limits that damped Gauss-Newton steps from `q` (nq) lead to, or None if it misses the pose."""
+        target = pin.SE3(R_WT, p_WT)
+        for _ in range(STEPS):
+            pin.computeJointJacobians(self.model, self.data, q)
+            error = self.data.oMi[self.joint].act(self.placement).actInv(target)
+            residual = pin.log6(error).vector
+            if np.abs(residual).max() < REACHED:
+                return q
+            J = self.placement.toActionMatrixInverse() @ pin.getJointJacobian(self.model, self.data, self.joint, pin.LOCAL)
+            J = pin.Jlog6(error.inverse()) @ J
+            q = np.clip(q + J.T @ np.linalg.solve(J @ J.T + DAMPING * np.eye(6), residual), self.lo, self.hi)
         return None
 
     def clearance(self, q: np.ndarray) -> float:
