@@ -124,7 +124,7 @@ std::string Plant::init() {
   step_us_ = static_cast<int64_t>(model_.m->opt.timestep * 1e6 + 0.5);
 
   if (!o_.series.empty()) {
-    wrong = series_.read(o_.series.c_str(), model_.nq);
+    wrong = series_.read(o_.series.c_str(), model_.nq, model_.nv);
     if (wrong.empty()) wrong = model_.select_hand(series_.hand.c_str());
     if (!wrong.empty()) return wrong;
     if (model_.robot_digest && series_.robot_digest && model_.robot_digest != series_.robot_digest) {

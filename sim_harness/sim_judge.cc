@@ -1,6 +1,7 @@
 #include "sim_harness/sim_judge.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace engram::sim {
 
@@ -75,6 +76,9 @@ const JumpRecord* Judge::judge(const Model& model, double t) {
   record.position_error = position;
   record.rotation_error = rotation;
   record.joint_excess = std::max(record.joint_excess, model.joint_excess());
+  for (size_t i = 0; i < series_.speed.size(); ++i) {
+    record.speed_share = std::max(record.speed_share, std::fabs(model.d->qvel[i]) / series_.speed[i]);
+  }
   if (contact >= 0 && record.contact_time < 0) {
     record.contact_time = since;
     record.contact = std::string(model.geom_label(model.d->contact[contact].geom1)) + " - " +
@@ -112,10 +116,10 @@ void write_records(std::FILE* file, const std::vector<JumpRecord>& records) {
     std::fprintf(
         file,
         "%s    {\"episode\": %d, \"jump\": %d, \"t_start_s\": %.3f, \"t_end_s\": %.3f, \"success\": %s, \"reason\": \"%s\", "
-        "\"arrival_s\": %.3f, \"contact_time_s\": %.3f, \"contact\": \"%s\", \"joint_excess\": %.6f, \"torque_share\": %.4f, "
-        "\"position_error_m\": %.5f, \"rotation_error_rad\": %.5f, \"statuses\": {",
+        "\"arrival_s\": %.3f, \"contact_time_s\": %.3f, \"contact\": \"%s\", \"joint_excess\": %.6f, \"speed_share\": %.4f, "
+        "\"torque_share\": %.4f, \"position_error_m\": %.5f, \"rotation_error_rad\": %.5f, \"statuses\": {",
         separator, r.episode, r.jump, r.t_start, r.t_end, r.success() ? "true" : "false", r.reason().c_str(), r.arrival,
-        r.contact_time, r.contact.c_str(), r.joint_excess, r.torque_share, r.position_error, r.rotation_error);
+        r.contact_time, r.contact.c_str(), r.joint_excess, r.speed_share, r.torque_share, r.position_error, r.rotation_error);
     const char* comma = "";
     for (int status = 0; status < kMaxStatus; ++status) {
       if (r.statuses[status] == 0) continue;

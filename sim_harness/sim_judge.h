@@ -11,8 +11,12 @@
 
 namespace engram::sim {
 
-// A joint rests some tenths of a milliradian inside MuJoCo's soft limit; beyond this it counts as broken.
-constexpr double kLimitTolerance = 1e-3;  // rad or m
+// A joint rests some tenths of a milliradian inside MuJoCo's soft limit; beyond this the limit counts as broken.
+constexpr double kJointTolerance = 1e-3;  // rad or m
+// Torques are clamped by the controller to the very limit: no more than rounding may be left.
+constexpr double kTorqueTolerance = 1e-9;  // 1, of the limit
+// A velocity limit is a barrier of the optimal control problem, not a clamp: the fast feedback may brush it.
+constexpr double kSpeedTolerance = 0.02;  // 1, of the limit
 constexpr int kMaxStatus = 32;
 
 // How one jump ended. Times in s of the plant clock unless stated.
@@ -24,6 +28,7 @@ struct JumpRecord {
   double contact_time = -1;       // s after the jump of the first robot-world contact, -1: none
   std::string contact;            // the two geoms
   double joint_excess = 0;        // rad or m beyond a joint's range
+  double speed_share = 0;         // largest |v| / limit
   double torque_share = 0;        // largest |tau| / limit
   double position_error = 0;      // m at the end
   double rotation_error = 0;      // rad at the end
@@ -34,7 +39,9 @@ struct JumpRecord {
   bool move_contact = false;
 
   bool late() const { return arrival < 0; }
-  bool limit() const { return joint_excess > kLimitTolerance; }
+  bool limit() const {
+    return joint_excess > kJointTolerance || speed_share > 1 + kSpeedTolerance || torque_share > 1 + kTorqueTolerance;
+  }
   bool success() const { return !late() && contact_time < 0 && !limit(); }
   std::string reason() const;  // "ok", or what failed, joined by '+': late, contact, limit
 };

@@ -42,7 +42,7 @@ int Series::jump_count() const {
   return count;
 }
 
-std::string Series::read(const char* path, int nq) {
+std::string Series::read(const char* path, int nq, int nv) {
   std::ifstream file(path);
   if (!file) return std::string("cannot read the series '") + path + "'; `engram demo` writes one from a seed";
   std::string text, key;
@@ -70,6 +70,9 @@ std::string Series::read(const char* path, int nq) {
     } else if (key == "tolerance") {
       if (numbers.size() != 2 || numbers[0] <= 0 || numbers[1] <= 0) return fault("`tolerance` needs metres and radians");
       position_tolerance = numbers[0], rotation_tolerance = numbers[1];
+    } else if (key == "speed") {
+      if (static_cast<int>(numbers.size()) != nv) return fault("`speed` needs nv = " + std::to_string(nv) + " numbers");
+      speed = numbers;
     } else if (key == "episode") {
       if (static_cast<int>(numbers.size()) != nq) return fault("`episode` needs nq = " + std::to_string(nq) + " numbers");
       episodes.push_back({numbers, {}});

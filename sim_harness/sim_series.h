@@ -7,6 +7,7 @@
 //   window <s>                         a jump must arrive within this time
 //   hold <s>                           and stay for this time
 //   tolerance <m> <rad>                within this distance
+//   speed v...                         limits of the velocities (nv numbers, convention of state_t); optional
 //   episode q...                       the robot is put here, at rest (nq numbers, convention of state_t)
 //   jump  px py pz x y z w  value...   target of the hand (m, unit quaternion) and the task vector of the same target
 //   move  dt  px py pz x y z w  value...   after the jump before it has ended: the target dt seconds later
@@ -47,11 +48,12 @@ struct Series {
   double window = 3.0, hold = 0.3;   // s
   double position_tolerance = 0.01;  // m
   double rotation_tolerance = 0.1;   // rad
+  std::vector<double> speed;         // velocity limits (nv), or empty
   std::vector<Episode> episodes;
 
   int jump_count() const;
   // Returns an empty string, or one line with file, line number, what is wrong and what to do.
-  std::string read(const char* path, int nq);
+  std::string read(const char* path, int nq, int nv);
 };
 
 }  // namespace engram::sim
