@@ -103,7 +103,7 @@ def build(spec: RobotSpec) -> Tree:
     nj = model.njoints - 1
     kind, continuous, R_turn = np.zeros(nj, int), np.zeros(nj, bool), np.zeros((nj, 3, 3))
     for i in range(nj):
-        kind[i], continuous[i], axis = _classify(spec, model.names[i + 1], model.joints[i + 1])
+        kind[i], continuous[i], axis = _classify(spec, model, model.names[i + 1], model.joints[i + 1])
         R_turn[i] = np.eye(3) if axis is None else turn_to(axis)
     parent = np.array(model.parents)[1:] - 1
     R_PJ, p_PJ, com, inertia = np.zeros((nj, 3, 3)), np.zeros((nj, 3)), np.zeros((nj, 3)), np.zeros((nj, 3, 3))
@@ -240,24 +240,18 @@ def _override(spec: RobotSpec, model: pin.Model) -> None:
             array[i] = values.get(key, array[i])
 
 
-def _classify(spec: RobotSpec, name: str, joint: pin.JointModel) -> tuple[int, bool, np.ndarray | None]:
-    """Kind, whether continuous, and axis in Pinocchio's joint frame (None: free)."""
-    short = joint.shortname()
-    if short == "JointModelFreeFlyer":
+def _classify(spec: RobotSpec, model: pin.Model, name: str, joint: pin.JointModel) -> tuple[int, bool, np.ndarray | None]:
+    """Kind, whether continuous, and axis in Pinocchio's joint frame (None: free), from the joint's motion subspace."""
+    if joint.nv == 6:
         return FREE, False, None
-    for kind, continuous, prefix in ((REVOLUTE, False, "R"), (REVOLUTE, True, "RUB"), (PRISMATIC, False, "P")):
-        if short in (f"JointModel{prefix}{letter}" for letter in "XYZ"):
-            return kind, continuous, np.eye(3)["XYZ".index(short[-1])]
-    for kind, continuous, long in (
-        (REVOLUTE, False, "JointModelRevoluteUnaligned"),
-        (REVOLUTE, True, "JointModelRevoluteUnboundedUnaligned"),
-        (PRISMATIC, False, "JointModelPrismaticUnaligned"),
-    ):
-        if short == long:
-            return kind, continuous, np.array(joint.extract().axis)
-    raise spec.file.error(
-        name, f"joint '{name}' is a {short}; only free-flyer base, revolute, continuous and prismatic joints are known"
-    )
+    data = joint.createData()
+    joint.calc(data, pin.neutral(model))
+    linear, angular = np.split(np.array(data.S), 2)
+    if joint.nv != 1 or (np.any(linear) and np.any(angular)):
+        kinds = "free-flyer base, revolute, continuous and prismatic"
+        raise spec.file.error(name, f"this joint is a {joint.shortname()}; known are {kinds}")
+    kind = REVOLUTE if np.any(angular) else PRISMATIC
+    return kind, joint.nq == 2, (angular if kind == REVOLUTE else linear).ravel()
 
 
 def _frame(spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link: str) -> tuple[int, np.ndarray, np.ndarray]:
@@ -278,6 +272,8 @@ def _check(spec: RobotSpec, tree: Tree) -> None:
         q, lo, hi = (a[tree.iq[i]] for a in (tree.q_home, tree.q_lo, tree.q_hi))
         if tree.parent[i] >= i or (tree.parent[i] >= 0 and i >= tree.parent[i] + tree.nsub[tree.parent[i]]):
             raise spec.file.error(name, f"joint '{name}' is not in depth-first order")
+        if tree.kind[i] == FREE and i > 0:
+            raise spec.file.error(name, f"joint '{name}' floats inside the tree; only the base may be free")
         if tree.mass[i] <= 0.0 or np.linalg.eigvalsh(tree.inertia[i])[0] <= 0.0:
             raise spec.file.error(
                 name, f"the body moved by joint '{name}' has no mass or no inertia; lock the joint or mend the URDF"
