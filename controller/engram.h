@@ -30,8 +30,8 @@ extern "C" {
 #define ENGRAM_KNOTS_MAX 64   // bound on the knots of a plan
 #define ENGRAM_GUESSES_MAX 16 // bound on the candidates of one cycle
 
-typedef struct engram engram;              // one controller, living in the caller's memory
-typedef struct engram_model engram_model;  // one robot, task and memory, compiled in; read-only
+typedef struct engram_controller engram_controller;  // one controller, living in the caller's memory
+typedef struct engram_model engram_model;            // one robot, task and memory, compiled in; read-only
 
 // The models of this library. A program may use several.
 extern const engram_model engram_panda_reach;
@@ -155,31 +155,32 @@ size_t engram_sizeof(const engram_model* model);
 
 // Builds a controller in `memory` (any alignment) and writes its handle, a pointer into the block. It holds until its first
 // task. `options` NULL: the defaults. Nothing to free. On error the handle is NULL.
-engram_error engram_init(const engram_model* model, void* memory, size_t bytes, const engram_options* options, engram** handle);
+engram_error engram_init(const engram_model* model, void* memory, size_t bytes, const engram_options* options,
+                         engram_controller** handle);
 
 // Forgets task, plan and state, keeps the options: the plant has restarted. Neither thread may be inside a call.
-void engram_reset(engram* handle);
+void engram_reset(engram_controller* handle);
 
-const engram_model* engram_model_of(const engram* handle);
+const engram_model* engram_model_of(const engram_controller* handle);
 
 // ---- one period ----
 
 // What to do from `utime` on: the task vector (names, units, order of models/<robot>/<task>/task.toml). A new `jump` number
 // starts the motion's clock anew; the same number moves the target of the motion under way.
 // Returns ENGRAM_CONVERGED (taken), ENGRAM_TASK_FAR (taken) or ENGRAM_BAD_TASK (refused).
-engram_status engram_set_task(engram* handle, int64_t utime, int32_t jump, const double* value, int32_t n);
+engram_status engram_set_task(engram_controller* handle, int64_t utime, int32_t jump, const double* value, int32_t n);
 
 // Plans for the state expected at `utime`, the next tick: all the work that can be done before the state is known.
-engram_status engram_prepare(engram* handle, int64_t utime);
+engram_status engram_prepare(engram_controller* handle, int64_t utime);
 
 // Takes the state q (nq), v (nv) measured at `utime`, finishes the plan, checks it, and hands it to engram_command.
-engram_status engram_feedback(engram* handle, int64_t utime, const double* q, const double* v);
+engram_status engram_feedback(engram_controller* handle, int64_t utime, const double* q, const double* v);
 
 // Torque for the state q (nq), v (nv) measured at `utime`:
 //     tau = u*(t) - K(t) (x [-] x*(t)),  then clamped to the torque limits and to torque_rate.
 // x*, u*, K: the plan, at its knot and moved along it to `utime`; K = - d tau / d x (nu x 2 nv), x [-] x* = (q [-] q*, v - v*).
 // On the lower rungs the law of that rung. `tau` (nu) in N m (or N) is always finite, whatever the state.
-engram_status engram_command(engram* handle, int64_t utime, const double* q, const double* v, double* tau);
+engram_status engram_command(engram_controller* handle, int64_t utime, const double* q, const double* v, double* tau);
 
 // ---- what happened ----
 
@@ -203,10 +204,10 @@ typedef struct engram_cycle {
   double path[ENGRAM_KNOTS_MAX][3];       // m, planned hand position in the world, one row per knot
   double query_us, candidates_us, linearize_us, backward_us, rollout_us, total_us;  // by options.clock; 0 without one
 } engram_cycle;
-void engram_cycle_info(const engram* handle, engram_cycle* cycle);
+void engram_cycle_info(const engram_controller* handle, engram_cycle* cycle);
 
-// The optimal control problem that the last jump posed (whole knots from the expected state x0) and how fast it was solved: merit of
-// the guess, and after each iteration of the jump's own period.
+// The optimal control problem that the last jump posed (whole knots from the expected state x0) and how fast it was solved: merit
+// of the guess, and after each iteration of the jump's own period.
 #define ENGRAM_JUMP_ITERATIONS 50
 typedef struct engram_jump {
   int32_t jump;                              // 0: none yet
@@ -217,11 +218,11 @@ typedef struct engram_jump {
   double task[ENGRAM_NTASK_MAX];             // task vector
   double merit[ENGRAM_JUMP_ITERATIONS + 1];  // [0] of the guess, [k] after iteration k; cost + weight * L1 norm of the gaps
 } engram_jump;
-void engram_jump_info(const engram* handle, engram_jump* jump);
+void engram_jump_info(const engram_controller* handle, engram_jump* jump);
 
 // The plan under way: knot times (N + 1) in us, states x (N + 1 rows of nq + nv), controls u (N rows of nu), gains
 // K (N blocks of nu x 2 nv, row-major, sign as in engram_command). Any pointer may be NULL. Returns N; 0: no plan.
-int32_t engram_plan(const engram* handle, int64_t* utime, double* x, double* u, double* K);
+int32_t engram_plan(const engram_controller* handle, int64_t* utime, double* x, double* u, double* K);
 
 #ifdef __cplusplus
 }

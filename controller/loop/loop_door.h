@@ -1,0 +1,27 @@
+// Behind the door: what an engram_model points to.
+#ifndef CONTROLLER_LOOP_LOOP_DOOR_H_
+#define CONTROLLER_LOOP_LOOP_DOOR_H_
+
+#include "controller/engram.h"
+
+// The head of every controller; fast side and planner follow in the same block.
+struct alignas(ENGRAM_ALIGN) engram_controller {
+  const engram_model* model;
+  engram_options options;
+};
+
+struct engram_model {
+  engram_description about;
+  size_t bytes;  // of the controller
+  bool (*tables_fit)();
+  engram_controller* (*build)(const engram_model*, const engram_options&, void* at);
+  engram_status (*set_task)(engram_controller*, int64_t, int32_t, const double*, int);
+  engram_status (*prepare)(engram_controller*, int64_t);
+  engram_status (*feedback)(engram_controller*, int64_t, const double*, const double*);
+  engram_status (*command)(engram_controller*, int64_t, const double*, const double*, double*);
+  const engram_cycle& (*cycle)(const engram_controller*);
+  const engram_jump& (*jump)(const engram_controller*);
+  int32_t (*plan)(const engram_controller*, int64_t*, double*, double*, double*);
+};
+
+#endif  // CONTROLLER_LOOP_LOOP_DOOR_H_

@@ -1,0 +1,50 @@
+// The model of a reach task, as the loop sees any task: problem, knots, obstacles, memory.
+#ifndef CONTROLLER_LOOP_LOOP_REACH_H_
+#define CONTROLLER_LOOP_LOOP_REACH_H_
+
+#include "controller/loop/loop_merit.h"
+#include "controller/ocp/ocp_reach.h"
+
+namespace engram {
+
+// Memory_: where guesses come from (loop_reach_memory.h).
+template <class Task_, class Memory_> struct ReachModel {
+  using Task = Task_;
+  using Memory = Memory_;
+  using R = typename Task::Robot;
+  using P = Reach<Task>;
+  using Knot = typename P::template Knot<double>;
+  using Target = ReachTarget;
+  static constexpr int N = Task::nknots;
+  static constexpr int ntask = Task::ntask;
+  static constexpr int64_t kStepUs = static_cast<int64_t>(1e6 * Task::dt + 0.5);
+  static constexpr int64_t kTickUs = 10000;
+  static_assert(kStepUs % kTickUs == 0, "a knot is a whole number of ticks");
+
+  static bool target(const double* value, Target& t) { return reach_target(value, t); }
+  // True within the range the memory was built for.
+  static bool known(const double* value) {
+    for (int i = 0; i < ntask; ++i)
+      if (!(value[i] >= Task::task_lo[i] && value[i] <= Task::task_hi[i])) return false;
+    return true;
+  }
+  static void knot(const Target& t, double dt, double since_jump, Knot& k) { reach_knot<Task>(t, dt, since_jump, k); }
+  template <class S> static S clearance(const S* q) { return reach_clearance<Task, S>(q); }
+  template <class S> static void hand(const S* q, S* p_WH) {
+    Mat3<S> R_WH;
+    Vec3<S> p;
+    reach_hand<Task, S>(q, R_WH, p);
+    for (int i = 0; i < 3; ++i) p_WH[i] = p[i];
+  }
+};
+
+// A memory that knows nothing.
+template <class Task> struct NoReachMemory {
+  static constexpr int kGuesses = 0;
+  static constexpr uint64_t kTableDigest = 0;
+  static bool tables_fit() { return true; }
+  template <class P> int guesses(const ReachTarget&, bool, const double*, int, const double*, Candidate<P>*, int n) { return n; }
+};
+
+}  // namespace engram
+#endif  // CONTROLLER_LOOP_LOOP_REACH_H_
