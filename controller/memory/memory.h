@@ -1,10 +1,14 @@
 // The memory of motion: a state and a task in, guesses of the optimal motion (xs, us) with a trust figure out.
 //
-// Kinds of guesses (memory_query.h composes them; it never ranks them: that is the merit's business, in loop/):
-//   neighbour   one of the remembered motions nearest in task space, warped to the measured state and to the goal
-//   regression  the mean of a Gaussian process over the remembered motions, warped likewise
-//   line        a minimum-jerk straight line in joint space to an inverse kinematics solution
-// Every guess is a motion without gaps: velocities are those of the warped path, controls its inverse dynamics.
+// What is remembered of a motion is its posture at the end and its bow: how it deviates from the minimum-jerk straight line between
+// its own ends. Bent to another start and another end, the bow stays (memory_warp.h). Kinds of guesses:
+//
+//   neighbour   one of the remembered motions nearest in task space, bent to the measured state and to the goal
+//   regression  end and bow predicted by a Gaussian process over all of them, bent likewise
+//   line        no bow: a straight line to an inverse kinematics solution
+//
+// Every guess is a motion without gaps: velocities are those of the path, controls its inverse dynamics. The memory composes
+// guesses; it does not rank them: that is the merit's business, in loop/.
 //
 // Templates over a Task (tables/<robot>_<task>/task.h). No heap, no exceptions, no I/O; bounded: operations are stated below.
 #ifndef CONTROLLER_MEMORY_MEMORY_H_
@@ -21,48 +25,46 @@
 
 namespace engram {
 
-// The tables of one robot and task. Inputs of knn and gpr: memory_features; their values: PCA coefficients of the motion, whose
-// decoded numbers are RBF weights (k, nchannel), channels q (nq) then u (nu).
+// The tables of one robot and task.
 struct MemoryTables {
-  const TabKnn* knn;
-  const TabGpr* gpr;
-  const TabPca* pca;
-  const TabRbf* rbf;
-  const TabLogit* trust;  // inputs: kMemoryTrustInputs numbers, see memory_query.h
+  const TabKnn* knn;      // memory_features -> end posture (nq), coefficients of the bow (m)
+  const TabGpr* gpr;      // the same map
+  const TabPca* bow;      // coefficients of the bow (m) -> its weights over time (k, nq)
+  const TabRbf* time;     // the Gaussians over time, nq channels; its domain [0, T] is the length of a remembered motion
+  const TabLogit* trust;  // memory_trust_inputs -> probability that the solver succeeds
 };
 
 enum class GuessKind : int32_t { kNeighbour, kRegression, kLine };
 
-inline constexpr int kMemoryNeighbours = 10;                    // most neighbours of a query
-inline constexpr int kMemoryLines = 3;                          // to the best neighbour's posture, from home, from here
+inline constexpr int kMemoryNeighbours = 10;  // most neighbours of a query
+inline constexpr int kMemoryLines = 3;        // to the best neighbour's posture, to one found from home, to one found from here
 inline constexpr int kMemoryGuesses = kMemoryNeighbours + 1 + kMemoryLines;
 
 struct MemoryOpts {
-  int neighbours = kMemoryNeighbours;  // 0: the memory is not asked
+  int neighbours = kMemoryNeighbours;  // 0 .. kMemoryNeighbours
   bool regression = true;
-  int lines = kMemoryLines;            // 0 .. kMemoryLines
-  double max_warp = 1.2;               // [rad] a goal correction that turns a joint further refuses the guess
-  double ik_tolerance = 1e-3;          // [m, rad] inverse kinematics worse than this refuses a warp
+  int lines = kMemoryLines;     // 0 .. kMemoryLines; the first needs neighbours
+  double max_warp = 1.2;        // [rad] a goal correction that turns a joint further refuses the guess
 };
 
 template <class Task> struct Guess {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots;
   GuessKind kind;
-  int32_t source;               // neighbour: index of the sample; line: number of its start; regression: 0
-  double trust;                 // [0, 1] estimated probability that the solver succeeds from here
-  double warp;                  // [rad] largest joint correction at the goal
+  int32_t source;  // neighbour: index of its sample; line: its number; regression: 0
+  double trust;    // [0, 1] estimated probability that the solver succeeds from here
+  double warp;     // [rad] largest joint correction of the end
   double x[N + 1][R::nq + R::nv];  // states at the knots; x[0] is the measured state
-  double u[N][R::nu];              // controls that drive x exactly (inverse dynamics), not clamped
+  double u[N][R::nu];              // controls that drive x (inverse dynamics), not clamped
 };
 
-// What a query found. Written completely by every query.
+// What a query found. Every query writes all but the guesses beyond n.
 template <class Task> struct MemoryAnswer {
-  int n;                 // guesses
-  TabStatus status;      // kTabOutside: the task lies outside the tables' domain; kTabNotFinite: no guesses
-  double distance;       // to the nearest sample, scaled [-]; infinite if the memory was not asked
-  double deviation;      // of the Gaussian process, relative to its prior: 0 (known) .. 1 (unknown)
-  int refused;           // neighbours and regressions refused by the warp
+  int32_t n;          // guesses
+  int32_t refused;    // neighbours and regressions whose end could not be bent to the goal
+  TabStatus status;   // kTabOutside: the task lies outside the tables' domain; kTabNotFinite: no guesses
+  double distance;    // to the nearest sample, scaled [-]; infinite if the memory was not asked
+  double deviation;   // of the regression, relative to its prior: 0 (known) .. 1 (unknown); 1 if it was not asked
   Guess<Task> guess[kMemoryGuesses];
 };
 

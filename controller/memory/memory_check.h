@@ -12,15 +12,16 @@ template <class Task> TabStatus memory_check(const MemoryTables& tables, char* t
   const struct {
     const TabHead* head;
     TabKind kind;
-  } expected[] = {{head(tables.knn), kTabKnn}, {head(tables.gpr), kTabGpr}, {head(tables.pca), kTabPca},
-                  {head(tables.rbf), kTabRbf}, {head(tables.trust), kTabLogit}};
+  } expected[] = {{head(tables.knn), kTabKnn}, {head(tables.gpr), kTabGpr}, {head(tables.bow), kTabPca},
+                  {head(tables.time), kTabRbf}, {head(tables.trust), kTabLogit}};
   for (const auto& table : expected) {
     if (tab_check(table.head, table.kind, R::digest, Task::digest, text) != kTabOk) return kTabBad;
   }
+  const int outputs = R::nq + tables.bow->m;  // end posture, coefficients of the bow
   const bool fit = tables.knn->d == kMemoryFeatures<Task> && tables.gpr->d == kMemoryFeatures<Task> &&
-                   tables.trust->d == kMemoryTrustInputs && tables.rbf->nchannel == R::nq + R::nu &&
-                   tables.pca->n == tables.rbf->k * tables.rbf->nchannel && tables.pca->m == tables.knn->m &&
-                   tables.pca->m == tables.gpr->m;
+                   tables.knn->m == outputs && tables.gpr->m == outputs && outputs <= kMemoryMaxOutputs &&
+                   tables.time->nchannel == R::nq && tables.bow->n == tables.time->k * R::nq &&
+                   tables.trust->d == kMemoryTrustInputs;
   if (fit) return kTabOk;
   constexpr char kMisfit[] = "the memory's tables do not fit each other; run 'make tables' and build again";
   static_assert(sizeof kMisfit <= TAB_TEXT, "fits the caller's buffer");

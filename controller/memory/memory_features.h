@@ -19,6 +19,9 @@ template <class Task> void memory_features(const double* q, const ReachTarget& g
   }
 }
 
+// Most outputs of the k-NN and GPR tables: end posture and coefficients of the bow
+inline constexpr int kMemoryMaxOutputs = 96;
+
 // Inputs of the trust table: distance of the sample, deviation of the regression, warp at the goal [rad], is it a regression, a line
 inline constexpr int kMemoryTrustInputs = 5;
 

@@ -1,4 +1,4 @@
-// The warp: a remembered path bent to the measured state and to a goal posture, and the motion along it.
+// The warp: a remembered bow bent to the measured state and to a goal posture, and the motion along it.
 #ifndef CONTROLLER_MEMORY_MEMORY_WARP_H_
 #define CONTROLLER_MEMORY_MEMORY_WARP_H_
 
@@ -16,26 +16,23 @@ struct Blend {
   }
 };
 
-// Ends of a remembered path (lanes are motions), and what they are to become.
-template <class R, class S> struct WarpEnds {
-  S start_q[R::nq], start_v[R::nv];  // of the remembered path
-  S end_q[R::nq];                    // at its end
-  S goal_q[R::nq];                   // what the end is to become
-};
-
-// Bends the path q (n + 1 knots, remembered -> warped, in place) so that it starts at x0 and ends at ends.goal_q:
+// Bends a bow to new ends, in place: bow (n + 1 knots, deviation from the straight line between its own ends) -> path
 //
-//   q(t) += (1 - s) (q0 - q_start) + s (q_goal - q_end) + T h (v0 - v_start),   s, h at t / T
+//   q(t) = (1 - s) q0 + s q_end + T h v0 + bow(t),   s, h at t / T
 //
-// t (n + 1) knot times [s], T: length of the memory [s].
+// For a remembered motion q_m with bow = q_m - (1 - s) q_m(0) - s q_m(T) this is q_m + (1 - s) (q0 - q_m(0)) + s (q_end - q_m(T)),
+// and the velocity v0 at the start, which a remembered motion from rest does not have, fades out.
+//
+//   x0   (nq + nv)  measured state
+//   end  (nq)       posture to arrive at (lanes are guesses)
+//   t    (n + 1)    knot times [s];  T: length of a remembered motion [s]
 template <class R, class S, class Path>
-void warp_path(const double* x0, const WarpEnds<R, S>& ends, int n, const double* t, double T, Path& q) {
+void warp_bow(const double* x0, const S* end, int n, const double* t, double T, Path& path) {
   static_assert(R::nq == R::nv, "a free base needs the warp on its manifold");
   for (int k = 0; k <= n; ++k) {
     const Blend blend(t[k] / T);
     for (int i = 0; i < R::nq; ++i) {
-      q[k][i] += (1 - blend.s) * (S(x0[i]) - ends.start_q[i]) + blend.s * (ends.goal_q[i] - ends.end_q[i]) +
-                 T * blend.h * (S(x0[R::nq + i]) - ends.start_v[i]);
+      path[k][i] += (1 - blend.s) * x0[i] + T * blend.h * x0[R::nq + i] + blend.s * end[i];
     }
   }
 }

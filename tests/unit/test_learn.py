@@ -7,8 +7,8 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
+from engram.learn.bow import fit_bow_code
 from engram.learn.gpr import fit_gpr, fit_hyperparameters, round_digits
-from engram.learn.motion import fit_motion_code
 from engram.learn.timebase import TimeBasis
 
 T = 1.5
@@ -16,18 +16,17 @@ TIMES = np.linspace(0, T, 51)
 TIME = TimeBasis(18, T)
 
 
-def minimum_jerk(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Task x (n, 4), motions q (n, 51, 2) from start to goal with a bow, and torques u (n, 50, 2)."""
+def minimum_jerk(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
+    """Task x (n, 4) and motions q (n, 51, 2) from start to goal with a bow."""
     x = np.random.default_rng(seed).uniform(-1, 1, (n, 4))
     r = TIMES / T
     s = (10 * r**3 - 15 * r**4 + 6 * r**5)[None, :, None]
     start, goal = x[:, None, :2], x[:, None, 2:]
-    q = start + s * (goal - start) + 0.3 * np.sin(np.pi * s) * start * goal
-    return x, q, 5.0 * np.gradient(np.gradient(q, TIMES, axis=1), TIMES, axis=1)[:, :-1]
+    return x, start + s * (goal - start) + 0.3 * np.sin(np.pi * s) * start * goal
 
 
 def test_gaussians_restore_smooth_motions_and_their_ends() -> None:
-    _, q, _ = minimum_jerk(50)
+    _, q = minimum_jerk(50)
     weights = TIME.fit(TIMES, q)
     back = np.einsum("tk,nkc->ntc", TIME.phi(TIMES), weights)
     np.testing.assert_allclose(back[:, [0, -1]], q[:, [0, -1]], atol=1e-10)  # pinned, up to rounding of the KKT system
@@ -36,28 +35,31 @@ def test_gaussians_restore_smooth_motions_and_their_ends() -> None:
     np.testing.assert_allclose(constant, 0.7, atol=1e-6)  # the ridge pulls by 1e-8
 
 
-def test_pca_decodes_what_it_encodes() -> None:
-    _, q, u = minimum_jerk(200)
-    code = fit_motion_code(TIME, TIMES, q, u, np.full(2, 20.0), 6)  # the data span 6: 4 straight, 2 bowed
-    z = code.encode(TIMES, q, u)
-    q_back, u_back = code.decode(z, TIMES)
-    assert np.abs(q_back - q).max() < 2e-3  # rad
-    assert np.abs(u_back[:, 1:-2] - u[:, 1:-1]).max() < 0.05 * np.abs(u).max()
+def test_a_bow_decodes_to_its_motion_and_vanishes_at_the_ends() -> None:
+    _, q = minimum_jerk(200)
+    code = fit_bow_code(TIME, TIMES, q, 2)  # the data bow in two ways
+    z = code.encode(TIMES, q)
+    assert np.abs(code.decode(z, TIMES, q[:, 0], q[:, -1]) - q).max() < 2e-3  # rad
     np.testing.assert_allclose(z.std(axis=0), 1.0, rtol=1e-9)  # coefficients in units of their spread
     np.testing.assert_allclose(z.mean(axis=0), 0.0, atol=1e-9)
+    ends = np.random.default_rng(1).normal(size=(2, 200, 2))
+    anything = np.random.default_rng(2).normal(size=z.shape)
+    bent = code.decode(anything, TIMES, *ends)
+    np.testing.assert_allclose(bent[:, [0, -1]].transpose(1, 0, 2), ends, atol=1e-9)  # rounding of the KKT system
 
 
 def test_more_components_never_fit_worse() -> None:
-    _, q, u = minimum_jerk(100)
+    rng = np.random.default_rng(3)
+    q = minimum_jerk(100)[1] + 0.2 * np.sin(np.pi * np.outer(rng.uniform(1, 4, 100), TIMES))[:, :, None] * rng.normal(size=(100, 1, 2))
     errors = []
-    for m in (2, 4, 8):
-        code = fit_motion_code(TIME, TIMES, q, u, np.full(2, 20.0), m)
-        errors.append(np.abs(code.decode(code.encode(TIMES, q, u), TIMES)[0] - q).mean())
-    assert errors[0] > errors[1] > errors[2]
+    for m in (2, 4, 8, 16):
+        code = fit_bow_code(TIME, TIMES, q, m)
+        errors.append(np.abs(code.decode(code.encode(TIMES, q), TIMES, q[:, 0], q[:, -1]) - q).mean())
+    assert errors == sorted(errors, reverse=True) and errors[-1] < 0.2 * errors[0]
 
 
 def test_gpr_equals_scikit_learn() -> None:
-    x, q, _ = minimum_jerk(80)
+    x, q = minimum_jerk(80)
     z = q[:, 25]
     length, noise = np.array([0.9, 1.1, 2.0, 0.7]), 1e-3
     own = fit_gpr(x, z, length, noise)

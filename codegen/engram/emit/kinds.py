@@ -12,14 +12,15 @@ from engram.emit.arrays import Array, array, blocks, pad, padded_rows, triangle
 
 @dataclass(kw_only=True)
 class Table(ABC):
-    """What all kinds have in common (TabHead). `lo`, `hi`: domain; `inputs`: (name, unit) per input."""
+    """What all kinds have in common (TabHead). `lo`, `hi`: domain; `inputs`: (name, unit) per input; `role`: what it is called."""
 
     inputs: list[tuple[str, str]]
     lo: np.ndarray
     hi: np.ndarray
     held_out_error: float
     held_out_text: str
-    kind: str = field(init=False, default="")  # file and symbol suffix; TabKnn for "knn"
+    role: str = ""  # part of file and symbol names; the kind if empty
+    kind: str = field(init=False, default="")  # "knn" for TabKnn
     constant: str = field(init=False, default="")  # its TabKind
 
     @property

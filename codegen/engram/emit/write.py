@@ -132,7 +132,7 @@ def write_tables(
     files: dict[str, bytes] = {}
     entries, symbols = [], []
     for table in tables:
-        symbol = f"{name}_{table.kind}_v{SCHEMA}"
+        symbol = f"{name}_{table.role or table.kind}_v{SCHEMA}"
         if symbol in (s for _, s in symbols):
             raise ValueError(f"two tables would be called '{symbol}'")
         made = render(table, symbol, prefix, robot_digest, task_digest, provenance)
@@ -150,7 +150,7 @@ def write_tables(
         })
         files.update(made)
 
-    includes = "".join(f'#include "controller/tab/tab_{t.kind}.h"\n' for t, _ in sorted(symbols, key=lambda s: s[0].kind))
+    includes = "".join(f'#include "controller/tab/tab_{kind}.h"\n' for kind in sorted({t.kind for t, _ in symbols}))
     externs = "".join(f"extern const Tab{t.kind.capitalize()} {s};  /* {t.held_out_text} */\n" for t, s in symbols)
     guard = f"TABLES_{name.upper()}_TABLES_H_"
     files["tables.h"] = (
