@@ -1,0 +1,226 @@
+"""Robot pipeline: the tree and its headers from robot.toml, and one clear message for every wrong input."""
+
+import os
+import re
+import shutil
+import subprocess
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from engram.cli import main
+from engram.paths import ROOT
+from engram.robots.emit_header import c_double, robot_header
+from engram.robots.emit_mjcf import robot_mjcf
+from engram.robots.spec import read_spec
+from engram.robots.tree import FREE, PRISMATIC, REVOLUTE, build, load, q_from_pin, q_to_pin, turn_to
+
+ZOO = ROOT / "tests" / "reference" / "zoo"
+
+
+@pytest.fixture()
+def models(tmp_path) -> Path:
+    """A models/ folder that holds the zoo robot, free to be spoilt."""
+    shutil.copytree(ZOO, tmp_path / "models" / "zoo")
+    return tmp_path / "models"
+
+
+def spoil(models: Path, old: str, new: str, file: str = "robot.toml") -> None:
+    path = models / "zoo" / file
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+
+
+def run(models: Path, *names: str) -> int:
+    out = models.parent
+    return main(["robot", *names, "--models", str(models), "--tables", str(out / "tables"), "--build", str(out / "build")])
+
+
+@pytest.mark.parametrize("axis", [*np.eye(3), *-np.eye(3), [1, 2, -1], [-0.2, 0.1, 0.5]])
+def test_turn_puts_z_on_the_axis(axis):
+    axis = np.array(axis) / np.linalg.norm(axis)
+    R = turn_to(axis)
+    assert np.array_equal(R[:, 2], axis)
+    assert np.allclose(R.T @ R, np.eye(3), atol=1e-15) and np.linalg.det(R) > 0.0
+    if np.count_nonzero(axis) == 1:
+        assert set(np.unique(np.abs(R))) == {0.0, 1.0}  # a permutation: no rounding
+
+
+def test_turned_tree_moves_as_the_urdf():
+    """Forward kinematics by R_PJ, p_PJ and rotations about z alone put every body where Pinocchio does."""
+    tree = build(read_spec("zoo", ZOO.parent))
+    assert set(tree.kind) == {FREE, REVOLUTE, PRISMATIC} and tree.continuous.sum() == 2
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-0.5, 0.5, tree.nq)
+    q[3:7] = [0.5, -0.5, 0.5, 0.5]
+    data = tree.model.createData()
+    pin.forwardKinematics(tree.model, data, q_to_pin(tree, q))
+    world = []
+    for i in range(tree.nj):
+        joint = pin.SE3(tree.R_PJ[i], tree.p_PJ[i])
+        part = q[tree.iq[i] :]
+        if tree.kind[i] == FREE:
+            joint = joint * pin.XYZQUATToSE3(part[:7])
+        elif tree.kind[i] == REVOLUTE:
+            joint = joint * pin.SE3(pin.exp3(np.array([0.0, 0.0, part[0]])), np.zeros(3))
+        else:
+            joint = joint * pin.SE3(np.eye(3), np.array([0.0, 0.0, part[0]]))
+        world.append(joint if tree.parent[i] < 0 else world[tree.parent[i]] * joint)
+        turned = data.oMi[i + 1] * pin.SE3(tree.R_turn[i], np.zeros(3))
+        assert turned.isApprox(world[i], 1e-13)
+
+
+def test_configuration_maps_both_ways():
+    tree = build(read_spec("zoo", ZOO.parent))
+    q = tree.q_home.copy()
+    assert q[tree.iq[tree.joint_name.index("wheel")]] == pytest.approx(3.0, abs=1e-15)
+    assert len(q_to_pin(tree, q)) == tree.nq + 2  # cosine and sine of two continuous joints
+    assert np.allclose(q_from_pin(tree, q_to_pin(tree, q)), q, atol=1e-15)
+
+
+def test_settings_of_robot_toml_arrive():
+    tree = build(read_spec("zoo", ZOO.parent))
+    slider, oblique = (tree.iv[tree.joint_name.index(name)] for name in ("slider", "oblique"))
+    assert "welded" not in tree.joint_name
+    assert tree.armature[slider] == 0.3 and tree.armature[oblique] == 0.05 and not tree.armature[:6].any()
+    assert tree.u_max[slider - 6] == 20.0 and tree.u_max[oblique - 6] == 30.0
+    assert tree.frame_name == ["tip", "wheel_rim"]
+    # the tip hangs on the locked joint: its sphere moved over to the wheel that carries it
+    assert tree.joint_name[tree.sphere_joint[0]] == "oblique_wheel"
+
+
+def test_armature_of_talos_is_that_of_its_rotors():
+    """example-robot-data states rotor inertia and gear ratio; robot.toml states their product."""
+    import example_robot_data
+
+    tree = load("talos")
+    assert np.allclose(tree.armature, example_robot_data.load("talos").model.armature, rtol=1e-12)
+    assert (tree.nq, tree.nv, tree.nu) == (39, 38, 32)
+
+
+@pytest.mark.parametrize("value", [0.1, -1.0 / 3.0, 1e8, 5e-324, 1.2345678901234567e-12, 1.0, -0.0])
+def test_literals_restore_every_bit(value):
+    assert float.fromhex(c_double(value)) == value
+
+
+def test_numbers_that_are_not_finite_never_reach_a_table():
+    with pytest.raises(ValueError, match="not finite"):
+        c_double(float("nan"))
+
+
+@pytest.mark.parametrize("name", ["panda", "talos"])
+def test_committed_files_are_what_the_command_writes(name):
+    tree = load(name)
+    assert (ROOT / "tables" / name / "robot.h").read_text(encoding="utf-8") == robot_header(tree)
+    assert (ROOT / "tables" / name / "robot.xml").read_text(encoding="utf-8") == robot_mjcf(tree)
+
+
+def test_header_compiles_and_holds_the_numbers(models, tmp_path):
+    """A robot without spheres and frames on a locked link still gives a header that compiles without warnings."""
+    spoil(models, "tip_link = [[0.0, 0.0, 0.0, 0.05]]", "")
+    assert run(models, "zoo") == 0
+    tree = build(read_spec("zoo", models))
+    source = tmp_path / "print.cc"
+    source.write_text(
+        '#include "tables/zoo/robot.h"\n#include <cstdio>\nusing R = engram::robots::Zoo;\n'
+        "int main() {\n"
+        '  std::printf("%d %d %d %d %d\\n", R::nj, R::nq, R::nv, R::nu, R::nsphere);\n'
+        '  for (int i = 0; i < R::nj; ++i) std::printf("%a %a\\n", R::mass[i], R::R_PJ[i][5]);\n'
+        "}\n"
+    )
+    binary = tmp_path / "print"
+    eigen = subprocess.run(["pkg-config", "--cflags-only-I", "eigen3"], check=True, capture_output=True, text=True)
+    includes = [f"-I{tmp_path}", f"-I{ROOT}", "-isystem", eigen.stdout.strip().removeprefix("-I")]
+    flags = ["-std=c++17", "-O0", "-march=native", "-Wall", "-Wextra", "-Werror"]
+    subprocess.run([os.environ.get("CXX", "g++"), *flags, *includes, str(source), "-o", str(binary)], check=True)
+    first, *rows = subprocess.run([str(binary)], check=True, capture_output=True, text=True).stdout.splitlines()
+    assert first == f"{tree.nj} {tree.nq} {tree.nv} {tree.nu} 0"
+    for i, row in enumerate(rows):
+        assert [float.fromhex(word) for word in row.split()] == [tree.mass[i], tree.R_PJ[i][1, 2]]
+
+
+def test_digest_follows_every_number(models):
+    before = build(read_spec("zoo", models)).digest
+    assert build(read_spec("zoo", models)).digest == before
+    spoil(models, "armature = 0.3", "armature = 0.3000001")
+    assert build(read_spec("zoo", models)).digest != before
+
+
+def test_mjcf_keeps_what_mujoco_must_not_touch():
+    root = ElementTree.fromstring(robot_mjcf(build(read_spec("zoo", ZOO.parent))))
+    compiler = root.find("compiler").attrib
+    assert compiler["balanceinertia"] == compiler["inertiafromgeom"] == compiler["fusestatic"] == "false"
+    joints = root.findall(".//joint[@axis]")
+    assert joints and {joint.get("axis") for joint in joints} == {"0 0 1"}
+    assert {joint.get("damping") for joint in root.iter("joint")} - {None} == {"0"}
+    names = [joint.get("name") for joint in joints]
+    assert [motor.get("joint") for motor in root.iter("motor")] == names
+
+
+def test_meshes_are_written_and_found(tmp_path):
+    assert main(["robot", "panda", "--tables", str(tmp_path / "t"), "--build", str(tmp_path / "b"), "--meshes"]) == 0
+    shown = ElementTree.parse(tmp_path / "b" / "scene" / "panda.xml").getroot()
+    files = [tmp_path / "b" / "scene" / mesh.get("file") for mesh in shown.iter("mesh")]
+    assert len(files) > 20 and all(file.is_file() for file in files)
+    colours = {geom.get("rgba") for geom in shown.iter("geom") if geom.get("type") == "mesh"}
+    assert len(colours) > 2  # the parts of the arm kept their colours
+
+
+WRONG = {
+    "unknown key": ("free_base", "fre_base", r"robot\.toml:3: fre_base: unknown key; did you mean 'free_base'\?"),
+    "missing key": ("home = {", "gravity = [0, 0, -1]\n# {", r"key 'home' is missing"),
+    "broken TOML": ("armature = 0.05", "armature = = 1", r"not valid TOML.*line 4"),
+    "not a number": ("armature = 0.05", 'armature = "much"', r"robot\.toml:4: armature: expected numbers"),
+    "not finite": ("armature = 0.05", "armature = nan", r"robot\.toml:4: armature: every number must be finite"),
+    "missing URDF": ('"zoo.urdf"', '"zo.urdf"', r"robot\.toml:2: urdf: no URDF at .*zo\.urdf; correct the path"),
+    "two sources": ("free_base", 'example_robot_data = "panda"\nfree_base', r"exactly one of 'urdf'"),
+    "unknown joint": ("welded = 0.7", "wheld = 0.7", r"robot\.toml:8: wheld: zoo\.urdf has no such joint; did you mean"),
+    "unknown frame": ('"tip_link"', '"tap_link"', r"robot\.toml:15: tip: zoo\.urdf has no frame 'tap_link'; did you mean"),
+    "unknown joint key": ("u_max = 20.0", "umax = 20.0", r"robot\.toml:12: umax: unknown key; did you mean 'u_max'"),
+    "home outside": ("oblique = 0.2", "oblique = 2.0", r"nominal posture 2 is outside its limits \[-0\.8, 0\.9\]"),
+    "limits crossed": ("u_max = 20.0", "q_lo = 1.0", r"lower limit 1 is not below upper limit 0\.9"),
+    "sphere of no size": ("0.0, 0.05]]", "0.0, 0.0]]", r"radius .* must be positive"),
+    "sphere shape": ("0.0, 0.05]]", "0.05]]", r"tip_link: expected numbers of shape"),
+    "frame that rests": ('wheel_rim = "rim_link"', 'wheel_rim = "universe"', r"frame 'universe' does not move"),
+    "posture by name": ("home = {", 'home = "stand"\n# {', r"a posture by name needs an SRDF"),
+}
+
+
+@pytest.mark.parametrize("old, new, message", WRONG.values(), ids=WRONG.keys())
+def test_wrong_robot_toml_gives_one_message(models, capfd, old, new, message):
+    spoil(models, old, new)
+    assert run(models, "zoo") == 2
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1 and re.search(message, error), error
+    assert not (models.parent / "tables").exists()
+
+
+def test_wrong_urdf_gives_one_message(models, capfd):
+    (models / "zoo" / "zoo.urdf").write_text("<robot", encoding="utf-8")
+    assert run(models, "zoo") == 2
+    assert "Pinocchio cannot read this URDF" in capfd.readouterr().err
+
+
+def test_body_without_mass_is_refused(models, capfd):
+    spoil(models, 'mass value="', 'mass value="0.0" was="', "zoo.urdf")
+    assert run(models, "zoo") == 2
+    assert "no mass" in capfd.readouterr().err
+
+
+def test_unknown_names_are_answered(models, capsys):
+    assert run(models, "zooo") == 2
+    assert "unknown robot 'zooo'; did you mean 'zoo'?" in capsys.readouterr().err
+    assert main(["robto", "panda"]) == 2
+    assert "unknown command 'robto'; did you mean 'robot'?" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("argv", [["--help"], ["robot", "--help"], ["task", "--help"]])
+def test_help_shows_examples(argv, capsys):
+    with pytest.raises(SystemExit) as ended:
+        main(argv)
+    assert ended.value.code == 0
+    assert "examples:\n  engram" in capsys.readouterr().out
