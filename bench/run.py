@@ -88,11 +88,12 @@ def gate(name: str, errors: dict[str, float], tolerance: float) -> bool:
 
 
 def gate_problem(name: str, ours: dict, peer: dict) -> bool:
-    same_model = gate(f"{name} derivatives, gains", {f: difference(ours[f], peer[f]) for f in LINEARIZATION}, DERIVATIVE_TOLERANCE)
+    errors = {f: difference(ours[f], peer[f]) for f in LINEARIZATION}
+    same_model = gate(f"{name} derivatives, gains", errors, DERIVATIVE_TOLERANCE)
     cost = abs(ours["cost_converged"] - peer["cost_converged"]) / abs(peer["cost_converged"])
     same_cost = gate(f"{name} converged cost", {"cost": cost}, COST_TOLERANCE)
-    iterations = abs(ours["iterations"] - peer["iterations"])
-    same_path = gate(f"{name} iterations", {f"{ours['iterations']:g} and {peer['iterations']:g}": iterations}, ITERATION_TOLERANCE)
+    a, b = ours["iterations"], peer["iterations"]
+    same_path = gate(f"{name} iterations", {f"{a:g} and {b:g}": abs(a - b)}, ITERATION_TOLERANCE)
     return same_model and same_cost and same_path
 
 
@@ -232,7 +233,8 @@ class Bench:
         self.figures.rows += [
             {"id": f"bench.gemm.{side}", "value": value, "unit": "GFLOP/s", "n": 50, "gate": True} for side, value in rate.items()
         ]
-        print(f"\nmatrix product (Eigen, double): {rate['ours']:.0f} GFLOP/s under our flags, {rate['native']:.0f} with -march=native")
+        ours, native = rate["ours"], rate["native"]
+        print(f"\nmatrix product (Eigen, double): {ours:.0f} GFLOP/s under our flags, {native:.0f} with -march=native")
 
 
 def main() -> int:
