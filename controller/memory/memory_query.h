@@ -22,6 +22,7 @@ template <class Task> struct MemoryWork {
     double start[R::nq];      // where inverse kinematics starts
     double end[R::nq];        // where it ends: the goal posture
     bool reached;             // within kMemoryIkTolerance
+    double trust_inputs[kMemoryTrustInputs];
   };
   Slot slot[kMemoryGuesses + kLanes];  // padded with copies to whole packs
   double features[kMemoryFeatures<Task>];
@@ -107,18 +108,15 @@ template <class Task> void find_ends(const ReachTarget& goal, int slots, MemoryW
 
 // Trust and warp of a slot -> guess; false if its end is bent too far.
 template <class Task>
-bool judge(const MemoryTables& tables, const MemoryOpts& opts, double deviation, const typename MemoryWork<Task>::Slot& slot,
+bool judge(const MemoryTables& tables, const MemoryOpts& opts, double deviation, typename MemoryWork<Task>::Slot& slot,
            Guess<Task>& guess) {
   guess.kind = slot.kind;
   guess.source = slot.source;
   guess.warp = 0;
   for (int i = 0; i < Task::Robot::nq; ++i) guess.warp = std::fmax(guess.warp, std::fabs(slot.end[i] - slot.start[i]));
+  memory_trust_inputs(std::fmin(slot.distance, kMemoryFar), deviation, guess.warp, slot.kind, slot.trust_inputs);
   guess.trust = 0;
-  if (slot.reached) {
-    double inputs[kMemoryTrustInputs];
-    memory_trust_inputs(std::fmin(slot.distance, kMemoryFar), deviation, guess.warp, slot.kind, inputs);
-    tab_logit_eval(tables.trust, inputs, &guess.trust);
-  }
+  if (slot.reached) tab_logit_eval(tables.trust, slot.trust_inputs, &guess.trust);
   return slot.kind == GuessKind::kLine || (slot.reached && guess.warp <= opts.max_warp);
 }
 
