@@ -47,9 +47,9 @@ template <class S> struct ArticulatedInertia {
 // Overwrites d up to Y. No heap; cannot fail for a robot with positive definite M.
 template <class R, class S> inline void rbd_aba(const S* q, const S* v, const S* tau, RbdData<R, S>& d, S* a) {
   ArticulatedInertia<S> IA[R::nj];
-  Force<S> pA[R::nj];   // articulated bias force
-  Motion<S> A[R::nj];   // V_parent x V_i, then the acceleration
-  Force<S> U[R::nv];    // IA J
+  Force<S> pA[R::nj];  // articulated bias force
+  Motion<S> A[R::nj];  // V_parent x V_i, then the acceleration
+  Force<S> U[R::nv];   // IA J
   S D_inv[R::nv], u[R::nv];
 
   rbd_kinematics(q, d);
@@ -62,7 +62,7 @@ template <class R, class S> inline void rbd_aba(const S* q, const S* v, const S*
     pA[i] = cross(d.V[i], d.Y[i] * d.V[i]);
   }
   for (int i = R::nj - 1; i >= 0; --i) {
-    for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= R::iv[i]; --k) {
+    for (int k = kTree<R>.last[i]; k >= R::iv[i]; --k) {
       // U = IA J,  D = J . U,  u = tau - J . pA
       U[k] = IA[i] * d.J[k];
       D_inv[k] = 1.0 / (dot(d.J[k], U[k]) + R::armature[k]);
@@ -79,7 +79,7 @@ template <class R, class S> inline void rbd_aba(const S* q, const S* v, const S*
   for (int i = 0; i < R::nj; ++i) {
     const int p = R::parent[i];
     A[i] += p < 0 ? rbd_gravity_acceleration<R, S>() : A[p];
-    for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) {
+    for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) {
       a[k] = nmadd(dot(A[i], U[k]), D_inv[k], u[k]);
       A[i] = madd(d.J[k], a[k], A[i]);
     }

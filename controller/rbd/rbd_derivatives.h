@@ -21,7 +21,11 @@ template <class S> struct Coriolis {
   Vec3<S> p2;
   Mat3<S> D;
 
-  Coriolis& operator+=(const Coriolis& b) { p2 += b.p2; D += b.D; return *this; }
+  Coriolis& operator+=(const Coriolis& b) {
+    p2 += b.p2;
+    D += b.D;
+    return *this;
+  }
   Force<S> times_add(const Vec3<S>& w, const Force<S>& f) const { return {cross_add(w, p2, f.lin), mul_add(D, w, f.ang)}; }
   // g with J . C x = g . w_x
   Vec3<S> transposed_times(const Motion<S>& J) const { return cross_add(p2, J.lin, mul_transposed(D, J.ang)); }
@@ -33,7 +37,8 @@ template <class S> inline Coriolis<S> coriolis_of(const Inertia<S>& Y, const Mot
   const S half_trace = 0.5 * (Y.I[0] + Y.I[3] + Y.I[5]);
   const Vec3<S> w2 = V.ang * S(2.0), u2 = V.lin * S(2.0);
   C.p2 = cross_add<S>(w2, Y.moment, u2 * Y.mass);
-  const Vec3<S> E[3] = {{half_trace - Y.I[0], -Y.I[1], -Y.I[2]}, {-Y.I[1], half_trace - Y.I[3], -Y.I[4]}, {-Y.I[2], -Y.I[4], half_trace - Y.I[5]}};
+  const Vec3<S> E[3] = {
+      {half_trace - Y.I[0], -Y.I[1], -Y.I[2]}, {-Y.I[1], half_trace - Y.I[3], -Y.I[4]}, {-Y.I[2], -Y.I[4], half_trace - Y.I[5]}};
   for (int j = 0; j < 3; ++j) C.D.col(j) = -cross_add<S>(w2, E[j], u2 * Y.moment[j]);
   const S trace = dot(u2, Y.moment);
   for (int j = 0; j < 3; ++j) C.D(j, j) += trace;
@@ -46,15 +51,15 @@ template <class R, class S>
 inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& dtau_dq, Mat<S, R::nv, R::nv>& dtau_dv) {
   constexpr const Tree<R>& tree = kTree<R>;
   Motion<S> dAdq[R::nv], dAdv[R::nv];
-  Vec3<S> dVdq[R::nv];               // angular part: all that C sees
-  Force<S> f[R::nj];                 // of the subtree
-  Coriolis<S> C[R::nj];              // of the subtree
+  Vec3<S> dVdq[R::nv];   // angular part: all that C sees
+  Force<S> f[R::nj];     // of the subtree
+  Coriolis<S> C[R::nj];  // of the subtree
 
   for (int i = 0; i < R::nj; ++i) {
     const int p = R::parent[i];
     f[i] = d.f[i];
     C[i] = coriolis_of(d.Y[i], d.V[i]);
-    for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) {
+    for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) {
       if (p < 0) {
         dVdq[k].setZero();
         dAdq[k] = cross(rbd_gravity_acceleration<R, S>(), d.J[k]);
@@ -113,9 +118,9 @@ template <class R, class S> inline void rbd_solve_rows(const RbdData<R, S>& d, M
 
 // d a / d q, d a / d v and M^-1 = d a / d tau (nv x nv each):  d a = M^-1 (d tau - dtau_dq dq - dtau_dv dv).
 // Call right after rbd_forward_dynamics(q, v, tau, d, a); overwrites d.A and d.f with their values at a. No heap; cannot fail.
-template <class R, class S>
-inline void rbd_forward_derivatives(const S* /*q*/, const S* /*v*/, const S* /*tau*/, RbdData<R, S>& d, const S* a,
-                                    Mat<S, R::nv, R::nv>& da_dq, Mat<S, R::nv, R::nv>& da_dv, Mat<S, R::nv, R::nv>& Minv) {
+template <class R, class S> inline void rbd_forward_derivatives(const S* /*q*/, const S* /*v*/, const S* /*tau*/,
+                                                                RbdData<R, S>& d, const S* a, Mat<S, R::nv, R::nv>& da_dq,
+                                                                Mat<S, R::nv, R::nv>& da_dv, Mat<S, R::nv, R::nv>& Minv) {
   // accelerations and forces are affine in a: add J a and Y J a
   Motion<S> dA[R::nj];
   for (int i = 0; i < R::nj; ++i) {

@@ -14,9 +14,10 @@ template <class R, class S> inline void rbd_frame_placement(const RbdData<R, S>&
 }
 
 // Jacobian (3 x nv) of a point p_W fixed to joint i: its velocity in world axes is J v.
-template <class R, class S> inline void rbd_point_jacobian(const RbdData<R, S>& d, int i, const Vec3<S>& p_W, Mat<S, 3, R::nv>& J) {
+template <class R, class S>
+inline void rbd_point_jacobian(const RbdData<R, S>& d, int i, const Vec3<S>& p_W, Mat<S, 3, R::nv>& J) {
   J.setZero();
-  for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
+  for (int k = kTree<R>.last[i]; k >= 0; k = kTree<R>.parent[k]) {
     J.col(k) = cross_add(d.J[k].ang, p_W, d.J[k].lin);
   }
 }
@@ -27,19 +28,18 @@ template <class R, class S>
 inline void rbd_frame_jacobian(const RbdData<R, S>& d, int frame, const Vec3<S>& p_WF, Mat<S, 6, R::nv>& J) {
   const int i = R::frame_joint[frame];
   J.setZero();
-  for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
+  for (int k = kTree<R>.last[i]; k >= 0; k = kTree<R>.parent[k]) {
     J.template block<3, 1>(0, k) = cross_add(d.J[k].ang, p_WF, d.J[k].lin);
     J.template block<3, 1>(3, k) = d.J[k].ang;
   }
 }
 
 // The same in the axes of the frame (Pinocchio's LOCAL).
-template <class R, class S>
-inline void rbd_frame_jacobian_local(const RbdData<R, S>& d, int frame, const Mat3<S>& R_WF, const Vec3<S>& p_WF,
-                                     Mat<S, 6, R::nv>& J) {
+template <class R, class S> inline void rbd_frame_jacobian_local(const RbdData<R, S>& d, int frame, const Mat3<S>& R_WF,
+                                                                 const Vec3<S>& p_WF, Mat<S, 6, R::nv>& J) {
   const int i = R::frame_joint[frame];
   J.setZero();
-  for (int k = R::iv[i] + joint_nv(R::kind[i]) - 1; k >= 0; k = kTree<R>.parent[k]) {
+  for (int k = kTree<R>.last[i]; k >= 0; k = kTree<R>.parent[k]) {
     J.template block<3, 1>(0, k) = mul_transposed<S>(R_WF, cross_add(d.J[k].ang, p_WF, d.J[k].lin));
     J.template block<3, 1>(3, k) = mul_transposed<S>(R_WF, d.J[k].ang);
   }

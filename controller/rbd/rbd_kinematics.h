@@ -9,27 +9,25 @@ namespace engram {
 
 // Work space of one robot R over S. Spatial quantities are at the world origin in world axes.
 template <class R, class S> struct RbdData {
-  static_assert(only_base_is_free<R>(), "only the first joint may be free");
-
   // written by rbd_kinematics
-  Mat3<S> R_WJ[R::nj];   // joint axes in world
-  Vec3<S> p_WJ[R::nj];   // joint origin [m]
-  Motion<S> J[R::nv];    // column k: velocity of the subtree of dof k per unit of v[k]
+  Mat3<S> R_WJ[R::nj];  // joint axes in world
+  Vec3<S> p_WJ[R::nj];  // joint origin [m]
+  Motion<S> J[R::nv];   // column k: velocity of the subtree of dof k per unit of v[k]
 
   // written by rbd_velocity
-  Motion<S> V[R::nj];    // body velocity
+  Motion<S> V[R::nj];  // body velocity
 
   // written by rbd_inertias
-  Inertia<S> Y[R::nj];   // body inertia
+  Inertia<S> Y[R::nj];  // body inertia
   // written by rbd_crba
   Inertia<S> Yc[R::nj];  // inertia of the subtree
 
   // written by rbd_rnea and rbd_forward_dynamics
-  Motion<S> A[R::nj];    // body acceleration minus gravity
-  Force<S> f[R::nj];     // force that moves the body alone: Y A + V x* Y V
+  Motion<S> A[R::nj];  // body acceleration minus gravity
+  Force<S> f[R::nj];   // force that moves the body alone: Y A + V x* Y V
 
   // written by rbd_forward_dynamics: M = L' D L, L unit lower triangular and as sparse as the tree
-  Mat<S, R::nv, R::nv> L;   // strictly lower part, entries (k, ancestor of k)
+  Mat<S, R::nv, R::nv> L;  // strictly lower part, entries (k, ancestor of k)
   S D_inv[R::nv];
 };
 
@@ -56,32 +54,25 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
     }
     const S* qi = q + R::iq[i];
     Motion<S>* J = d.J + R::iv[i];
-    switch (R::kind[i]) {
-      case kRevolute: {
-        S s, c;
-        sincos(qi[0], s, c);
-        const Vec3<S> x = R_WJ.col(0), y = R_WJ.col(1), z = R_WJ.col(2);
-        R_WJ.col(0) = madd<S>(x, c, y * s);
-        R_WJ.col(1) = madd<S>(y, c, x * -s);
-        J[0] = {cross(p_WJ, z), z};
-        break;
+    if (has_free_base<R>() && i == 0) {
+      p_WJ = mul_add(R_WJ, Vec3<S>(qi[0], qi[1], qi[2]), p_WJ);
+      R_WJ = matmul(R_WJ, rotation_of(qi + 3));
+      for (int k = 0; k < 3; ++k) {
+        const Vec3<S> e = R_WJ.col(k);
+        J[k] = {e, Vec3<S>::Zero()};
+        J[3 + k] = {cross(p_WJ, e), e};
       }
-      case kPrismatic: {
-        const Vec3<S> z = R_WJ.col(2);
-        p_WJ = madd(z, qi[0], p_WJ);
-        J[0] = {z, Vec3<S>::Zero()};
-        break;
-      }
-      case kFree: {
-        p_WJ = mul_add(R_WJ, Vec3<S>(qi[0], qi[1], qi[2]), p_WJ);
-        R_WJ = matmul(R_WJ, rotation_of(qi + 3));
-        for (int k = 0; k < 3; ++k) {
-          const Vec3<S> e = R_WJ.col(k);
-          J[k] = {e, Vec3<S>::Zero()};
-          J[3 + k] = {cross(p_WJ, e), e};
-        }
-        break;
-      }
+    } else if (R::kind[i] == kRevolute) {
+      S s, c;
+      sincos(qi[0], s, c);
+      const Vec3<S> x = R_WJ.col(0), y = R_WJ.col(1), z = R_WJ.col(2);
+      R_WJ.col(0) = madd<S>(x, c, y * s);
+      R_WJ.col(1) = madd<S>(y, c, x * -s);
+      J[0] = {cross(p_WJ, z), z};
+    } else {
+      const Vec3<S> z = R_WJ.col(2);
+      p_WJ = madd(z, qi[0], p_WJ);
+      J[0] = {z, Vec3<S>::Zero()};
     }
     d.R_WJ[i] = R_WJ;
     d.p_WJ[i] = p_WJ;
@@ -90,7 +81,7 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
 
 // m + sum_k J_k x_k over the dofs of joint i
 template <class R, class S> inline Motion<S> rbd_add_joint_motion(const RbdData<R, S>& d, int i, const S* x, Motion<S> m) {
-  for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) m = madd(d.J[k], x[k], m);
+  for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) m = madd(d.J[k], x[k], m);
   return m;
 }
 
@@ -108,9 +99,7 @@ template <class R, class S> inline void rbd_inertias(RbdData<R, S>& d) {
 }
 
 // Acceleration of the world that stands in for gravity.
-template <class R, class S> inline Motion<S> rbd_gravity_acceleration() {
-  return {-constant3<S>(R::gravity), Vec3<S>::Zero()};
-}
+template <class R, class S> inline Motion<S> rbd_gravity_acceleration() { return {-constant3<S>(R::gravity), Vec3<S>::Zero()}; }
 
 }  // namespace engram
 #endif  // CONTROLLER_RBD_RBD_KINEMATICS_H_

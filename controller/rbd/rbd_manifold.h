@@ -22,10 +22,16 @@ template <class S> struct ExpCoefficients {
     const S t = sqrt(t2);
     S st, ct;
     sincos(t, st, ct);
-    a = select(small, polynomial(theta2, {1.0, -1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880, -1.0 / 39916800, 1.0 / 6227020800}), st / t);
-    b = select(small, polynomial(theta2, {1.0 / 2, -1.0 / 24, 1.0 / 720, -1.0 / 40320, 1.0 / 3628800, -1.0 / 479001600, 1.0 / 87178291200}),
-               (1.0 - ct) / t2);
-    c = select(small, polynomial(theta2, {1.0 / 6, -1.0 / 120, 1.0 / 5040, -1.0 / 362880, 1.0 / 39916800, -1.0 / 6227020800, 1.0 / 1307674368000}),
+    a = select(small,
+               polynomial(theta2, {1.0, -1.0 / 6, 1.0 / 120, -1.0 / 5040, 1.0 / 362880, -1.0 / 39916800, 1.0 / 6227020800}),
+               st / t);
+    b = select(
+        small,
+        polynomial(theta2, {1.0 / 2, -1.0 / 24, 1.0 / 720, -1.0 / 40320, 1.0 / 3628800, -1.0 / 479001600, 1.0 / 87178291200}),
+        (1.0 - ct) / t2);
+    c = select(small,
+               polynomial(theta2, {1.0 / 6, -1.0 / 120, 1.0 / 5040, -1.0 / 362880, 1.0 / 39916800, -1.0 / 6227020800,
+                                   1.0 / 1307674368000}),
                (t - st) / (t2 * t));
   }
 };
@@ -42,26 +48,31 @@ template <class S> struct LogCoefficients {
     sincos(0.5 * t, s, c);
     const S closed_alpha = 0.5 * t * c / s;
     // Bernoulli series of x cot x
-    beta = select(small, polynomial(theta2, {1.0 / 12, 1.0 / 720, 1.0 / 30240, 1.0 / 1209600, 1.0 / 47900160, 691.0 / 1307674368000,
-                                             1.0 / 74724249600, 3617.0 / 10670622842880000}),
+    beta = select(small,
+                  polynomial(theta2, {1.0 / 12, 1.0 / 720, 1.0 / 30240, 1.0 / 1209600, 1.0 / 47900160, 691.0 / 1307674368000,
+                                      1.0 / 74724249600, 3617.0 / 10670622842880000}),
                   (1.0 - closed_alpha) / t2);
-    alpha = 1.0 - beta * theta2;
-    gamma = select(small, polynomial(theta2, {2.0 / 720, 4.0 / 30240, 6.0 / 1209600, 8.0 / 47900160, 6910.0 / 1307674368000,
-                                              12.0 / 74724249600, 14 * 3617.0 / 10670622842880000}),
+    alpha = nmadd(beta, theta2, S(1.0));
+    gamma = select(small,
+                   polynomial(theta2, {2.0 / 720, 4.0 / 30240, 6.0 / 1209600, 8.0 / 47900160, 6910.0 / 1307674368000,
+                                       12.0 / 74724249600, 14 * 3617.0 / 10670622842880000}),
                    (0.25 * t2 / (s * s) + closed_alpha - 2.0) / (t2 * t2));
   }
 };
 
-// Rotation by the vector w [rad].
+// s 1 + [h]x + l r': the shape of exp3 and of the Jacobians of exp3 and log3
+template <class S> inline Mat3<S> scaled_identity_skew_outer(S s, const Vec3<S>& h, const Vec3<S>& l, const Vec3<S>& r) {
+  Mat3<S> A;
+  A << madd(l[0], r[0], s), msub(l[0], r[1], h[2]), madd(l[0], r[2], h[1]),  //
+      madd(l[1], r[0], h[2]), madd(l[1], r[1], s), msub(l[1], r[2], h[0]),   //
+      msub(l[2], r[0], h[1]), madd(l[2], r[1], h[0]), madd(l[2], r[2], s);
+  return A;
+}
+
+// Rotation by the vector w [rad]: cos(t) 1 + a [w]x + b w w'
 template <class S> inline Mat3<S> exp3(const Vec3<S>& w) {
   const ExpCoefficients<S> e(dot(w, w));
-  const Vec3<S> bw = w * e.b, aw = w * e.a;
-  const S diagonal = 1.0 - dot(w, bw);
-  Mat3<S> R;
-  R << diagonal + bw[0] * w[0], bw[0] * w[1] - aw[2], bw[0] * w[2] + aw[1],  //
-      bw[0] * w[1] + aw[2], diagonal + bw[1] * w[1], bw[1] * w[2] - aw[0],   //
-      bw[0] * w[2] - aw[1], bw[1] * w[2] + aw[0], diagonal + bw[2] * w[2];
-  return R;
+  return scaled_identity_skew_outer<S>(nmadd(e.b, dot(w, w), S(1.0)), w * e.a, w * e.b, w);
 }
 
 // Rotation vector of the quaternion (x y z w) of any positive norm: |w| <= pi.
@@ -96,31 +107,21 @@ template <class S> inline Vec3<S> log3(const Mat3<S>& R) {
 
 // d log3(R exp3(e)) / d e at e = 0 for w = log3(R):  alpha 1 + [w]x/2 + beta w w'
 template <class S> inline Mat3<S> jlog3(const Vec3<S>& w, const LogCoefficients<S>& l) {
-  const Vec3<S> bw = w * l.beta, h = w * S(0.5);
-  Mat3<S> J;
-  J << l.alpha + bw[0] * w[0], bw[0] * w[1] - h[2], bw[0] * w[2] + h[1],  //
-      bw[0] * w[1] + h[2], l.alpha + bw[1] * w[1], bw[1] * w[2] - h[0],   //
-      bw[0] * w[2] - h[1], bw[1] * w[2] + h[0], l.alpha + bw[2] * w[2];
-  return J;
+  return scaled_identity_skew_outer<S>(l.alpha, w * S(0.5), w * l.beta, w);
 }
 template <class S> inline Mat3<S> jlog3(const Vec3<S>& w) { return jlog3(w, LogCoefficients<S>(dot(w, w))); }
 
 // d exp3(w + e) = exp3(w) exp3(J e):  J = a 1 - b [w]x + c w w'
 template <class S> inline Mat3<S> jexp3(const Vec3<S>& w) {
   const ExpCoefficients<S> e(dot(w, w));
-  const Vec3<S> cw = w * e.c, bw = w * e.b;
-  Mat3<S> J;
-  J << e.a + cw[0] * w[0], cw[0] * w[1] + bw[2], cw[0] * w[2] - bw[1],  //
-      cw[0] * w[1] - bw[2], e.a + cw[1] * w[1], cw[1] * w[2] + bw[0],   //
-      cw[0] * w[2] + bw[1], cw[1] * w[2] - bw[0], e.a + cw[2] * w[2];
-  return J;
+  return scaled_identity_skew_outer<S>(e.a, w * -e.b, w * e.c, w);
 }
 
 // Placement (R, p) reached by the unit twist m: p = u + b w x u + c w x (w x u).
 template <class S> inline Vec3<S> exp6_position(const Motion<S>& m) {
   const ExpCoefficients<S> e(dot(m.ang, m.ang));
   const Vec3<S> wu = cross(m.ang, m.lin);
-  return m.lin + wu * e.b + cross(m.ang, wu) * e.c;
+  return madd<S>(cross(m.ang, wu), e.c, madd(wu, e.b, m.lin));
 }
 template <class S> inline void exp6(const Motion<S>& m, Mat3<S>& R, Vec3<S>& p) {
   R = exp3(m.ang);
@@ -130,7 +131,7 @@ template <class S> inline void exp6(const Motion<S>& m, Mat3<S>& R, Vec3<S>& p) 
 // Twist that reaches (R, p) with w = log3(R):  u = alpha p - w x p / 2 + beta (w . p) w
 template <class S> inline Vec3<S> log6_linear(const Vec3<S>& w, const Vec3<S>& p) {
   const LogCoefficients<S> l(dot(w, w));
-  return p * l.alpha - cross(w, p) * S(0.5) + w * (l.beta * dot(w, p));
+  return cross_add<S>(w * S(-0.5), p, madd<S>(w, l.beta * dot(w, p), p * l.alpha));
 }
 template <class S> inline Motion<S> log6(const Mat3<S>& R, const Vec3<S>& p) {
   const Vec3<S> w = log3(R);
@@ -143,10 +144,9 @@ template <class S> inline void jlog6_blocks(const Vec3<S>& w, const Vec3<S>& p, 
   const S theta2 = dot(w, w), wp = dot(w, p);
   const LogCoefficients<S> l(theta2);
   A = jlog3(w, l);
-  const Vec3<S> left = w * (l.gamma * wp) - p * (theta2 * l.gamma + 2.0 * l.beta), bw = w * l.beta;
-  C = skew<S>(p * S(0.5));
-  for (int j = 0; j < 3; ++j) C.col(j) += left * w[j] + bw * p[j];
-  for (int j = 0; j < 3; ++j) C(j, j) += l.beta * wp;
+  const Vec3<S> left = madd<S>(w, l.gamma * wp, p * -madd(theta2, l.gamma, 2.0 * l.beta)), bw = w * l.beta;
+  C = scaled_identity_skew_outer<S>(l.beta * wp, p * S(0.5), bw, p);
+  for (int j = 0; j < 3; ++j) C.col(j) = madd<S>(left, w[j], C.col(j));
 }
 
 template <class S> inline Mat<S, 6, 6> block_triangular(const Mat3<S>& A, const Mat3<S>& B) {
@@ -181,20 +181,20 @@ template <class R, class S> inline void rbd_integrate(const S* q, const S* dq, S
   constexpr int nb = has_free_base<R>() ? 1 : 0;
   if constexpr (nb) {
     const Motion<S> m = {{dq[0], dq[1], dq[2]}, {dq[3], dq[4], dq[5]}};
-    const Vec3<S> p = mul(rotation_of(q + 3), exp6_position(m));
+    const Vec3<S> p = mul_add(rotation_of(q + 3), exp6_position(m), Vec3<S>(q[0], q[1], q[2]));
     // e = (w sin(t/2)/t, cos(t/2))
     const S quarter = 0.25 * dot(m.ang, m.ang);
     const ExpCoefficients<S> half(quarter);
     const Vec3<S> ev = m.ang * (0.5 * half.a);
-    const S ew = 1.0 - quarter * half.b;
+    const S ew = nmadd(quarter, half.b, S(1.0));
     const Vec3<S> v(q[3], q[4], q[5]);
     const S w = q[6];
-    const Vec3<S> ov = ev * w + v * ew + cross(v, ev);
-    const S ow = w * ew - dot(v, ev);
-    const S scale = 1.0 / sqrt(dot(ov, ov) + ow * ow);
+    const Vec3<S> ov = cross_add<S>(v, ev, madd<S>(ev, w, v * ew));
+    const S ow = msub(w, ew, dot(v, ev));
+    const S scale = 1.0 / sqrt(dot_add(ov, ov, ow * ow));
     const S side = select(ew < S(0.0), -scale, scale);
     for (int i = 0; i < 3; ++i) {
-      q_out[i] = q[i] + p[i];
+      q_out[i] = p[i];
       q_out[3 + i] = ov[i] * side;
     }
     q_out[6] = ow * side;
@@ -206,9 +206,9 @@ template <class R, class S> inline void rbd_integrate(const S* q, const S* dq, S
 template <class S> inline void base_difference(const S* q0, const S* q1, S* quat, Vec3<S>& p) {
   p = mul_transposed<S>(rotation_of(q0 + 3), Vec3<S>(q1[0] - q0[0], q1[1] - q0[1], q1[2] - q0[2]));
   const Vec3<S> a(-q0[3], -q0[4], -q0[5]), b(q1[3], q1[4], q1[5]);
-  const Vec3<S> v = b * q0[6] + a * q1[6] + cross(a, b);
+  const Vec3<S> v = cross_add<S>(a, b, madd<S>(b, q0[6], a * q1[6]));
   for (int i = 0; i < 3; ++i) quat[i] = v[i];
-  quat[3] = q0[6] * q1[6] - dot(a, b);
+  quat[3] = msub(q0[6], q1[6], dot(a, b));
 }
 
 // dq (nv) = q1 (-) q0, so that q0 (+) dq = q1.
@@ -248,8 +248,8 @@ template <class S> inline void rbd_difference_jacobians(const S* q0, const S* q1
   const Mat<S, 6, 6> X = inverse_action(rotation_of(quat), p);
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j) {
-      S sum = S(0.0);
-      for (int k = 0; k < 6; ++k) sum += J1(i, k) * X(k, j);
+      S sum = J1(i, 0) * X(0, j);
+      for (int k = 1; k < 6; ++k) sum = madd(J1(i, k), X(k, j), sum);
       J0(i, j) = -sum;
     }
   }

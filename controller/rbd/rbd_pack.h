@@ -31,10 +31,22 @@ struct Pack {
   double operator[](int i) const { return l[i]; }
   void set(int i, double s) { l[i] = s; }
 
-  Pack& operator+=(Pack b) { l += b.l; return *this; }
-  Pack& operator-=(Pack b) { l -= b.l; return *this; }
-  Pack& operator*=(Pack b) { l *= b.l; return *this; }
-  Pack& operator/=(Pack b) { l /= b.l; return *this; }
+  Pack& operator+=(Pack b) {
+    l += b.l;
+    return *this;
+  }
+  Pack& operator-=(Pack b) {
+    l -= b.l;
+    return *this;
+  }
+  Pack& operator*=(Pack b) {
+    l *= b.l;
+    return *this;
+  }
+  Pack& operator/=(Pack b) {
+    l /= b.l;
+    return *this;
+  }
   friend Pack operator+(Pack a, Pack b) { return Pack(a.l + b.l); }
   friend Pack operator-(Pack a, Pack b) { return Pack(a.l - b.l); }
   friend Pack operator*(Pack a, Pack b) { return Pack(a.l * b.l); }
@@ -54,8 +66,16 @@ template <class S> inline S max(S a, S b) { return select(a > b, a, b); }
 template <class S> inline S min(S a, S b) { return select(a < b, a, b); }
 
 // Bit patterns, for the branch-free functions of rbd_math.h.
-inline int64_t to_bits(double a) { int64_t b; std::memcpy(&b, &a, sizeof b); return b; }
-inline double from_bits(int64_t b) { double a; std::memcpy(&a, &b, sizeof a); return a; }
+inline int64_t to_bits(double a) {
+  int64_t b;
+  std::memcpy(&b, &a, sizeof b);
+  return b;
+}
+inline double from_bits(int64_t b) {
+  double a;
+  std::memcpy(&a, &b, sizeof a);
+  return a;
+}
 inline Pack::Mask to_bits(Pack a) { return reinterpret_cast<Pack::Mask>(a.l); }
 inline Pack from_bits(Pack::Mask b) { return Pack(reinterpret_cast<Pack::Lanes>(b)); }
 

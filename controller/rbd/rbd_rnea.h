@@ -26,7 +26,7 @@ template <class R, class S> inline void rbd_project_forces(const RbdData<R, S>& 
   Force<S> f[R::nj];  // of the subtree
   for (int i = 0; i < R::nj; ++i) f[i] = d.f[i];
   for (int i = R::nj - 1; i >= 0; --i) {
-    for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) tau[k] = dot(d.J[k], f[i]);
+    for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) tau[k] = dot(d.J[k], f[i]);
     if (const int p = R::parent[i]; p >= 0) f[p] += f[i];
   }
 }
@@ -53,7 +53,7 @@ template <class R, class S> inline void rbd_gravity(RbdData<R, S>& d, S* g) {
   }
   for (int i = R::nj - 1; i >= 0; --i) {
     const Force<S> f = {up * d.Yc[i].mass, cross(d.Yc[i].moment, up)};
-    for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) g[k] = dot(d.J[k], f);
+    for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) g[k] = dot(d.J[k], f);
     if (const int p = R::parent[i]; p >= 0) {
       d.Yc[p].mass += d.Yc[i].mass;
       d.Yc[p].moment += d.Yc[i].moment;

@@ -85,7 +85,11 @@ template <class S> struct Motion {
   Vec3<S> lin, ang;
 
   static Motion zero() { return {Vec3<S>::Zero(), Vec3<S>::Zero()}; }
-  Motion& operator+=(const Motion& b) { lin += b.lin; ang += b.ang; return *this; }
+  Motion& operator+=(const Motion& b) {
+    lin += b.lin;
+    ang += b.ang;
+    return *this;
+  }
   friend Motion operator+(Motion a, const Motion& b) { return a += b; }
   friend Motion operator-(const Motion& a, const Motion& b) { return {a.lin - b.lin, a.ang - b.ang}; }
   friend Motion operator*(const Motion& a, S s) { return {a.lin * s, a.ang * s}; }
@@ -98,7 +102,11 @@ template <class S> struct Force {
   Vec3<S> lin, ang;
 
   static Force zero() { return {Vec3<S>::Zero(), Vec3<S>::Zero()}; }
-  Force& operator+=(const Force& b) { lin += b.lin; ang += b.ang; return *this; }
+  Force& operator+=(const Force& b) {
+    lin += b.lin;
+    ang += b.ang;
+    return *this;
+  }
   friend Force operator+(Force a, const Force& b) { return a += b; }
   friend Force operator-(const Force& a, const Force& b) { return {a.lin - b.lin, a.ang - b.ang}; }
   friend Force operator*(const Force& a, S s) { return {a.lin * s, a.ang * s}; }
@@ -148,8 +156,8 @@ template <class S> struct Inertia {
 
 // Inertia of a body with axes R_WJ and origin p_WJ; constants in its axes: `com`, and `inertia` about the com (xx xy xz yy yz zz).
 //   I = R Ic R' + m (|c|^2 1 - c c')
-template <class S>
-inline Inertia<S> inertia_in_world(const Mat3<S>& R_WJ, const Vec3<S>& p_WJ, double mass, const double* com, const double* inertia) {
+template <class S> inline Inertia<S> inertia_in_world(const Mat3<S>& R_WJ, const Vec3<S>& p_WJ, double mass, const double* com,
+                                                      const double* inertia) {
   const Vec3<S> c = mul_add(R_WJ, constant3<S>(com), p_WJ), mc = c * S(mass);
   const S Ic[6] = {S(inertia[0]), S(inertia[1]), S(inertia[2]), S(inertia[3]), S(inertia[4]), S(inertia[5])};
   const Vec3<S> none = Vec3<S>::Zero();

@@ -8,27 +8,6 @@
 
 namespace engram {
 
-constexpr int joint_nv(JointKind kind) { return kind == kFree ? 6 : 1; }
-
-template <class R> struct Tree {
-  int joint[R::nv] = {};   // joint of a dof
-  int parent[R::nv] = {};  // next dof towards the root, -1 at the root
-  int end[R::nv] = {};     // dofs of the subtree of k: [k, end[k])
-
-  constexpr Tree() {
-    for (int i = 0; i < R::nj; ++i) {
-      const int p = R::parent[i], last = i + R::nsub[i] - 1;
-      for (int k = R::iv[i]; k < R::iv[i] + joint_nv(R::kind[i]); ++k) {
-        joint[k] = i;
-        parent[k] = k > R::iv[i] ? k - 1 : p < 0 ? -1 : R::iv[p] + joint_nv(R::kind[p]) - 1;
-        end[k] = R::iv[last] + joint_nv(R::kind[last]);
-      }
-    }
-  }
-};
-
-template <class R> inline constexpr Tree<R> kTree{};
-
 // True if the base is free; no other joint may be.
 template <class R> constexpr bool has_free_base() { return R::kind[0] == kFree; }
 
@@ -38,6 +17,29 @@ template <class R> constexpr bool only_base_is_free() {
   }
   return true;
 }
+
+// Dofs of joint i.
+template <class R> constexpr int joint_nv(int i) { return has_free_base<R>() && i == 0 ? 6 : 1; }
+
+template <class R> struct Tree {
+  static_assert(only_base_is_free<R>(), "only the first joint may be free");
+  int joint[R::nv] = {};   // joint of a dof
+  int parent[R::nv] = {};  // next dof towards the root, -1 at the root
+  int last[R::nj] = {};    // last dof of a joint
+
+  constexpr Tree() {
+    for (int i = 0; i < R::nj; ++i) {
+      const int p = R::parent[i];
+      last[i] = R::iv[i] + joint_nv<R>(i) - 1;
+      for (int k = R::iv[i]; k <= last[i]; ++k) {
+        joint[k] = i;
+        parent[k] = k > R::iv[i] ? k - 1 : p < 0 ? -1 : last[p];
+      }
+    }
+  }
+};
+
+template <class R> inline constexpr Tree<R> kTree{};
 
 }  // namespace engram
 #endif  // CONTROLLER_RBD_RBD_TREE_H_
