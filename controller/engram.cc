@@ -74,7 +74,7 @@ void engram_default_options(const engram_model* model, engram_options* options) 
   options->memory = ENGRAM_MODE_MEMORY;
   options->iterations = 2;
   options->iterations_jump = 10;
-  options->line_search = 5;
+  options->line_search = 8;
   options->torque_rate = 100.0;
   options->clearance_min = 0.005;
   options->switch_gain = 0.1;

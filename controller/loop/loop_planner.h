@@ -16,8 +16,12 @@
 
 namespace engram {
 
-inline constexpr double kLargestGap = 0.1;  // rad, rad/s: a plan with a larger L1 gap is no motion yet
-inline constexpr double kStop = 1e-4;       // expected improvement below which a plan counts as converged
+// A plan is executed although its gaps (L1, rad and rad/s) are not quite closed: the next period closes them before they are reached,
+// if they are small, and smaller still in the near future.
+inline constexpr int kNearKnots = 10;
+inline constexpr double kLargestNearGap = 0.1;
+inline constexpr double kLargestGap = 0.5;
+inline constexpr double kStop = 1e-4;  // expected improvement below which a plan counts as converged
 
 template <class M> class Planner {
  public:
@@ -60,13 +64,12 @@ template <class M> class Planner {
   void pose_problem(int64_t utime, int64_t phase);
   int collect();
   int choose(int n) const;
-  bool iterate(double begin);
+  bool iterate(double begin, int iterations);
   void record_merit();
   engram_status judge(bool accepted);
   void look_along_trial();
   engram_status finish(engram_status status, engram_rung rung, double begin);
-  double open_gap() const { return (1.0 - (stats_.iterations ? stats_.last().step_length : 0.0)) * work_.gap; }
-  double first_gap() const;
+  double open_gap(int first = 0, int last = N) const;
   void drop_plan();
 
   const engram_options& options_;
@@ -127,10 +130,18 @@ template <class M> void Planner<M>::take_task(int64_t utime) {
   task_pending_ = false;
 }
 
+// The last measured state, carried along by what the plan moves until utime.
 template <class M> void Planner<M>::predict(int64_t utime, double* x) const {
-  if (plan_.n > 0) return plan_state(plan_, utime, x);
-  std::memcpy(x, watch_.x, sizeof(double) * nq);
-  std::memset(x + nq, 0, sizeof(double) * nv);
+  if (plan_.n == 0) {
+    std::memcpy(x, watch_.x, sizeof(double) * nq);
+    std::memset(x + nq, 0, sizeof(double) * nv);
+    return;
+  }
+  double planned[nx], then[nx], dx[P::Layout::nxp];
+  plan_state(plan_, watch_.utime, planned);
+  plan_state(plan_, utime, then);
+  P::difference(planned, watch_.x, dx);
+  P::integrate(then, dx, x);
 }
 
 // Knot times and parameters of the problem that starts at utime; ends of whole knots lie on phase + m kStepUs.
@@ -198,12 +209,9 @@ template <class M> void Planner<M>::record_merit() {
 }
 
 // All but the last half of the last iteration. False if the solver failed: solve_ says how.
-template <class M> bool Planner<M>::iterate(double begin) {
-  const bool waiting = jumped_ || plan_.n == 0 || plan_jump_ != task_.jump;  // no plan yet for this jump
-  const int iterations = waiting ? options_.iterations_jump : options_.iterations;
+template <class M> bool Planner<M>::iterate(double begin, int iterations) {
   bool relinearize = true;
   double slowest = 0.0;
-  fddp_start(solver_, work_, stats_);
   for (int i = 1;; ++i) {
     const double start = now();
     const FddpStatus direction = fddp_direction(horizon_, solver_, relinearize, work_, trial_.s, stats_);
@@ -241,6 +249,8 @@ template <class M> engram_status Planner<M>::prepare(int64_t utime) {
   const int n = collect();
   const Candidate<P>& winner = candidates_[choose(n)];
   cycle_.winner = winner.kind;
+  const bool resumed = winner.kind == ENGRAM_CANDIDATE_SHIFTED && !jumped_;  // the solve of the last period goes on
+  const double reg = work_.reg;
   trial_is_ = Trial::kNone;
   if (!std::isfinite(winner.merit)) return solve_ = ENGRAM_NOT_FINITE;
   std::memcpy(trial_.s.x, winner.x, sizeof(trial_.s.x));
@@ -254,7 +264,10 @@ template <class M> engram_status Planner<M>::prepare(int64_t utime) {
     std::memcpy(jump_.x0, horizon_.x0, sizeof(horizon_.x0));
     std::memcpy(jump_.task, task_.value, sizeof(task_.value));
   }
-  if (iterate(begin)) trial_is_ = Trial::kReady;
+  const bool waiting = fresh || plan_jump_ != task_.jump;  // the robot has no plan yet for this jump
+  fddp_start(solver_, work_, stats_);
+  if (resumed) work_.reg = reg;
+  if (iterate(begin, waiting ? options_.iterations_jump : options_.iterations)) trial_is_ = Trial::kReady;
   jumped_ = false;
   cycle_.total_us = now() - begin;
   return solve_;
@@ -294,17 +307,19 @@ template <class M> engram_status Planner<M>::judge(bool accepted) {
   look_along_trial();
   const double here = M::template clearance<double>(trial_.s.x[0]);  // a robot already too near may still leave
   if (!(cycle_.clearance >= std::min(options_.clearance_min, here - 1e-3))) return ENGRAM_COLLISION;
-  if (!(cycle_.gap - first_gap() <= kLargestGap)) return ENGRAM_OPEN_GAPS;
+  // gap 0 lies between the measured state and the first knot: the gains answer for it
+  if (!(open_gap(1, kNearKnots) <= kLargestNearGap && open_gap(1) <= kLargestGap)) return ENGRAM_OPEN_GAPS;
   if (solve_ == ENGRAM_DEADLINE) return ENGRAM_DEADLINE;
   if (!accepted) return ENGRAM_NO_DESCENT;
   return stats_.last().stop < kStop ? ENGRAM_CONVERGED : ENGRAM_ITERATING;
 }
 
-// The part of the gap between the measured state and the first knot: the gains answer for it.
-template <class M> double Planner<M>::first_gap() const {
+// What the last step left of the gaps of knots first to last, L1.
+template <class M> double Planner<M>::open_gap(int first, int last) const {
   double sum = 0.0;
-  for (double f : work_.f[0]) sum += std::fabs(f);
-  return work_.gap > 0.0 ? open_gap() * sum / work_.gap : 0.0;
+  for (int k = first; k <= last; ++k)
+    for (double f : work_.f[k]) sum += std::fabs(f);
+  return (1.0 - (stats_.iterations ? stats_.last().step_length : 0.0)) * sum;
 }
 
 template <class M> void Planner<M>::drop_plan() {
