@@ -27,7 +27,7 @@ template <class R> struct DofPath {
   int dof[R::nv] = {};
 
   constexpr explicit DofPath(int joint) {
-    const int last = R::iv[joint] + joint_nv(R::kind[joint]) - 1;
+    const int last = R::iv[joint] + joint_nv<R>(joint) - 1;
     for (int k = last; k >= 0; k = kTree<R>.parent[k]) ++n;
     for (int k = last, i = n; k >= 0; k = kTree<R>.parent[k]) dof[--i] = k;
   }
