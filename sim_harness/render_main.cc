@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
-#include <sstream>
 
 #include "sim_harness/render_log.h"
 #include "sim_harness/render_scene.h"
@@ -53,9 +52,11 @@ std::string read_clips(const std::string& path, size_t panels, std::vector<Clip>
   for (std::string line; std::getline(file, line);) {
     ++number;
     if (line.empty() || line[0] == '#') continue;
-    std::vector<std::string> words;
-    std::stringstream stream(line);
-    for (std::string word; std::getline(stream, word, ';');) words.push_back(word);
+    std::vector<std::string> words(1);
+    for (const char c : line) {
+      if (c == ';') words.emplace_back();
+      else words.back() += c;
+    }
     if (words.size() < 2 + 3 * panels) return path + ":" + std::to_string(number) + ": too few fields for the panels; see --help";
     Clip clip;
     clip.duration = std::atof(words[0].c_str());
@@ -186,6 +187,8 @@ int render_main(int argc, char** argv) {
       for (size_t i = 0; i < n; ++i) {
         const Part& part = clip.parts[i];
         const double wanted = part.begin + frame / o.fps, t = std::min(wanted, part.end);
+        const bool still = wanted > part.end + 1.5 / o.fps;  // the panel stands as it was drawn before
+        if (still && frame > 2) continue;
         const auto utime = static_cast<int64_t>(t * 1e6 + 0.5);
         Panel& panel = panels[i];
         panel.rect = rects[i];

@@ -35,6 +35,7 @@ Judge::Event Judge::begin_step(double t) {
   Event event;
   if (phase_ == Phase::kNextEpisode) {
     event.reset = &series_.episodes[episode_];
+    touching_ = false;
     phase_ = Phase::kNextJump;
   } else if (phase_ == Phase::kNextJump) {
     JumpRecord record;
@@ -44,6 +45,7 @@ Judge::Event Judge::begin_step(double t) {
     records_.push_back(record);
     event.task = target_ = &jump().target;
     held_since_ = -1;
+    still_touching_ = touching_;
     phase_ = Phase::kJump;
   } else if (phase_ == Phase::kMove && t > next_move_time_ - kHalfStep) {
     if (move_ == jump().moves.size()) {
@@ -63,6 +65,7 @@ const JumpRecord* Judge::judge(const Model& model, double t) {
   const Pose hand = model.hand_pose();
   const double position = position_error(hand, target_->pose), rotation = rotation_error(hand, target_->pose);
   const int contact = model.robot_world_contact();
+  touching_ = contact >= 0;
 
   if (phase_ == Phase::kMove) {
     ++record.move_steps;
@@ -79,7 +82,8 @@ const JumpRecord* Judge::judge(const Model& model, double t) {
   for (size_t i = 0; i < series_.speed.size(); ++i) {
     record.speed_share = std::max(record.speed_share, std::fabs(model.d->qvel[i]) / series_.speed[i]);
   }
-  if (contact >= 0 && record.contact_time < 0) {
+  if (contact < 0) still_touching_ = false;
+  if (contact >= 0 && !still_touching_ && record.contact_time < 0) {
     record.contact_time = since;
     record.contact = std::string(model.geom_label(model.d->contact[contact].geom1)) + " - " +
                      model.geom_label(model.d->contact[contact].geom2);

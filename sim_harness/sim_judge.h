@@ -77,6 +77,8 @@ class Judge {
   Phase phase_ = Phase::kNextEpisode;
   size_t episode_ = 0, jump_in_episode_ = 0, move_ = 0;
   const Target* target_ = nullptr;
+  bool touching_ = false;        // robot-world contact at the last step
+  bool still_touching_ = false;  // contact left over from the jump before: not counted until the arm has come free
   double held_since_ = -1, next_move_time_ = 0;
   std::vector<JumpRecord> records_;
 };

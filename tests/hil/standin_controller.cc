@@ -64,6 +64,7 @@ struct StandIn {
     }
     if (misbehave == 1) command.tau[0] = 0.0 / 0.0;
     command.utime = state.utime, command.seq = state.seq, command.robot_digest = state.robot_digest, command.nu = model.nu;
+    if (misbehave == 2) ++command.robot_digest;
   }
 
   void publish_cycle(const engram_msg_state_t& state) {
@@ -87,6 +88,9 @@ struct StandIn {
       if ((state.seq - 1) % 10 == 0) me.publish_cycle(state);
     }
     engram_msg_command_t_publish(me.lcm, kCommandChannel, &me.command);
+    engram_msg_timing_t timing{};
+    timing.utime = state.utime, timing.seq = me.cycle_count;
+    if ((state.seq - 1) % 10 == 0) engram_msg_timing_t_publish(me.lcm, kTimingChannel, &timing);
   }
 
   static void on_task(const lcm_recv_buf_t* buf, const char*, void* self) {
@@ -99,13 +103,16 @@ struct StandIn {
 
 int main(int argc, char** argv) {
   StandIn standin;
-  std::string scene, url, hand = "hand_tcp";
+  std::string scene, url, hand = "hand_tcp", unused;
   parse_options(argc, argv, "engram-standin: a simple controller to test the harness with",
                 {{"--scene", "FILE", "MJCF of robot and world", &scene},
                  {"--hand", "SITE", "site to steer; default hand_tcp", &hand},
                  {"--lcm-url", "URL", "LCM provider", &url},
                  {"--die-after-ms", "MS", "kill itself at this plant time", &standin.die_after},
-                 {"--misbehave", "KIND", "1: a torque that is not finite", &standin.misbehave}});
+                 {"--misbehave", "KIND", "1: a torque that is not finite; 2: another robot's digest", &standin.misbehave},
+                 {"--clock", "CLOCK", "accepted, as by the real one", &unused},
+                 {"--memory", "MODE", "accepted", &unused},
+                 {"--jumps", "FILE", "accepted", &unused}});
   install_mujoco_handlers("engram-standin");
   const std::string wrong = standin.model.load(scene.c_str());
   if (!wrong.empty()) return std::fprintf(stderr, "engram-standin: %s\n", wrong.c_str()), 2;

@@ -1,0 +1,163 @@
+"""The demo: one task series, several modes of the controller, and what came out of it."""
+
+import argparse
+import json
+import os
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from engram.inputs import InputError
+from engram.paths import BUILD, ROOT, relative
+from engram.tasks.spec import load_task
+from engram_sim import report, suboptimality, video
+from engram_sim.motion import Motion
+from engram_sim.pair import Pair, Progress, private_port, scene
+from engram_sim.results import MODES, Run, figures, read_run, read_runs
+from engram_sim.series import write_reach
+
+LOG_TRUNCATED = 3  # exit code of engram-plant: all done, but the disk was full
+SLOWEST_FIRST = ("cold", "shift", "line", "memory")  # so that no long run is left alone at the end
+
+
+def demo(args: argparse.Namespace) -> int:
+    """Run `engram demo`; arguments as its parser has them."""
+    start = time.monotonic()
+    modes = [mode.strip() for mode in args.modes.split(",") if mode.strip()]
+    if unknown := [mode for mode in modes if mode not in MODES]:
+        raise InputError(f"--modes: unknown mode '{unknown[0]}'; known: {', '.join(MODES)}")
+    if args.jumps < 1 or not modes:
+        raise InputError("--jumps and --modes: at least one jump and one mode")
+    folder = (args.out or ROOT / "runs" / time.strftime("%Y-%m-%d-%H%M%S")).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    point_latest(folder)
+
+    series = folder / "series.txt"
+    moving = write_reach(series, args.robot, args.task, args.seed, args.jumps)
+    print(f"series  {args.jumps} jumps, {moving} moving targets, seed {args.seed}: {relative(series)}")
+    codes = run_modes(args, modes, folder, series)
+    done = [mode for mode in MODES if mode in modes and codes[mode] in (0, LOG_TRUNCATED)]
+    if not done:
+        print("demo: no mode has run to its end; the reasons are above")
+        return 1
+
+    runs = [read_run(mode, folder / mode) for mode in done]
+    spec = load_task(args.robot, args.task)
+    header = {"robot": args.robot, "task": args.task, "seed": args.seed, "jumps": args.jumps, "clock": args.clock}
+    header |= {"window_s": spec.success["time"], "tolerance_m": spec.success["position"]}
+    drawn = None
+    if args.video > 0:
+        drawn = video.render(runs, video.shown_scene(args.robot, args.task), folder / "demo.mp4", spec.frame, args.video, args.jobs)
+    finish(folder, runs, header, drawn, time.monotonic() - start)
+    return 0 if len(done) == len(modes) and all(code == 0 for code in codes.values()) else 1
+
+
+def run_modes(args: argparse.Namespace, modes: list[str], folder: Path, series: Path) -> dict[str, int]:
+    """Run all modes, `args.jobs` at a time; the exit code of each mode's plant."""
+    options = [word for pair in args.plant_option for word in plant_option(pair)]
+    progress = Progress(len(modes) * args.jumps, "run   ")
+    ended: dict[str, list[bool]] = {mode: [] for mode in modes}
+
+    def run_mode(mode: str) -> int:
+        def jumped(jump: int, jumps: int, outcome: str, seconds: float) -> None:
+            ended[mode].append(outcome == "ok")
+            note = "  ".join(f"{name} {sum(good)}/{len(good)}" for name, good in ended.items() if good)
+            progress.show(sum(map(len, ended.values())), note)
+
+        pair = Pair(folder / mode, series, scene(args.robot, args.task), private_port(MODES.index(mode)), mode, clock=args.clock)
+        pair.controller = args.controller
+        pair.plant_options = ["--log-full", str(args.log_full), *options]
+        code = pair.run(jumped)
+        if code != 0:
+            print(f"\ndemo: {mode} ended with exit code {code}:\n{pair.last_words()}")
+        return code
+
+    order = [mode for mode in SLOWEST_FIRST if mode in modes]
+    with ThreadPoolExecutor(max(1, args.jobs)) as pool:
+        return dict(zip(order, pool.map(run_mode, order)))
+
+
+def plant_option(text: str) -> list[str]:
+    """noise-v=0.01 -> --noise-v 0.01"""
+    name, equal, value = text.partition("=")
+    if not equal:
+        raise InputError(f"--plant-option {text}: the form is OPTION=VALUE; `engram-plant --help` lists the options")
+    return [f"--{name.lstrip('-')}", value]
+
+
+def point_latest(folder: Path) -> None:
+    """Let runs/latest show to `folder`, if it lies beside it."""
+    latest = folder.parent / "latest"
+    if latest.is_symlink():
+        latest.unlink()
+    if not latest.exists():
+        os.symlink(folder.name, latest)
+
+
+def finish(folder: Path, runs: list[Run], header: dict[str, Any], drawn: Path | None, seconds: float) -> None:
+    """Write summary.json, report.html and the figures; print the summary."""
+    curves = suboptimality.curves(runs, header["robot"], header["task"])
+    for run in runs:
+        if run.mode in curves:
+            run.suboptimality = {k: curves[run.mode][:, k] for k in (1, 3)}
+    summary = header | {"wall_s": round(seconds, 1), "modes": {run.mode: run.summary() for run in runs}}
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    records = figures(header["robot"], runs)
+    (BUILD / "figures").mkdir(parents=True, exist_ok=True)
+    (BUILD / "figures" / "demo.json").write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
+
+    spec = load_task(header["robot"], header["task"])
+    motions = [Motion(run, spec.robot, spec.frame) for run in runs]
+    page = report.write(folder, runs, motions, summary, curves, drawn)
+    if drawn:
+        video.still(drawn, folder / "demo.png", 1.2)
+    print_summary(summary)
+    print(f"report  {relative(page)}")
+    if drawn:
+        print(f"video   {relative(drawn)}")
+    print(f"log     {relative(runs[0].log)}   (engram replay, lcm-logplayer)")
+    for run in runs:
+        if run.plant["log"]["truncated"]:
+            print(f"demo: the log of {run.mode} is cut short: the disk was full")
+
+
+def print_summary(summary: dict[str, Any]) -> None:
+    """The table of the report on the terminal."""
+    rows = report.table(summary)
+    widths = [max(len(row[c]) for row in rows) for c in range(len(rows[0]))]
+    print(f"\n{summary['robot']} {summary['task']}, {summary['jumps']} jumps, seed {summary['seed']}, {summary['wall_s']:.0f} s")
+    for row in rows:
+        print("  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))]))
+    print()
+
+
+def read_summary(folder: Path) -> dict[str, Any]:
+    """summary.json of a demo. Raises InputError."""
+    try:
+        return json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    except (OSError, json.JSONDecodeError) as error:
+        raise InputError(f"{relative(folder)}/summary.json: cannot be read ({error}); give the folder of a demo") from None
+
+
+def report_again(folder: Path) -> int:
+    """Write the report of a finished demo again."""
+    folder = folder.resolve()
+    header = read_summary(folder)
+    drawn = folder / "demo.mp4"
+    finish(folder, read_runs(folder), header, drawn if drawn.is_file() else None, header["wall_s"])
+    return 0
+
+
+def render_again(folder: Path, seconds: float, modes: str | None, jobs: int, out: Path | None) -> int:
+    """Draw the video of a finished demo again."""
+    folder = folder.resolve()
+    header = read_summary(folder)
+    wanted = modes.split(",") if modes else list(MODES)
+    runs = [run for run in read_runs(folder) if run.mode in wanted]
+    if not runs:
+        raise InputError(f"--modes {modes}: the run has none of them")
+    spec = load_task(header["robot"], header["task"])
+    path = video.render(runs, video.shown_scene(header["robot"], header["task"]), out or folder / "demo.mp4", spec.frame, seconds, jobs)
+    print(f"video   {relative(path)}" if path else "render: no jump was finished by all modes; nothing to show")
+    return 0 if path else 1
