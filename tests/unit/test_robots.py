@@ -15,8 +15,9 @@ from engram.cli import main
 from engram.paths import ROOT
 from engram.robots.emit_header import c_double, robot_header
 from engram.robots.emit_mjcf import robot_mjcf
+from engram.robots.linear3 import principal_axes, turn_to
 from engram.robots.spec import read_spec
-from engram.robots.tree import FREE, PRISMATIC, REVOLUTE, build, load, q_from_pin, q_to_pin, turn_to
+from engram.robots.tree import FREE, PRISMATIC, REVOLUTE, build, load, q_from_pin, q_to_pin
 
 ZOO = ROOT / "tests" / "reference" / "zoo"
 
@@ -48,6 +49,16 @@ def test_turn_puts_z_on_the_axis(axis):
     assert np.allclose(R.T @ R, np.eye(3), atol=1e-15) and np.linalg.det(R) > 0.0
     if np.count_nonzero(axis) == 1:
         assert set(np.unique(np.abs(R))) == {0.0, 1.0}  # a permutation: no rounding
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_principal_axes_give_the_inertia_back(seed):
+    square = np.random.default_rng(seed).standard_normal((3, 3))
+    inertia = square @ square.T if seed else np.diag([3.0, 1.0, 2.0])
+    moments, R = principal_axes(inertia)
+    assert np.allclose(R @ np.diag(moments) @ R.T, inertia, atol=1e-14 * np.abs(inertia).max())
+    assert np.allclose(moments, np.linalg.eigvalsh(inertia), atol=1e-14 * np.abs(inertia).max())
+    assert np.allclose(R.T @ R, np.eye(3), atol=1e-14) and np.linalg.det(R) > 0.0
 
 
 def test_turned_tree_moves_as_the_urdf():

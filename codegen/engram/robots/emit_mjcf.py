@@ -9,6 +9,7 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pinocchio as pin
 
+from engram.robots.linear3 import principal_axes
 from engram.robots.tree import FREE, NO_LIMIT, PRISMATIC, Tree
 from engram.robots.visuals import Visual
 
@@ -62,9 +63,7 @@ def _add_body(parent: ElementTree.Element, tree: Tree, i: int) -> ElementTree.El
     """Body i with its joint, inertia, named frames and collision spheres."""
     name = tree.joint_name[i]
     body = ElementTree.SubElement(parent, "body", name=name, pos=words(tree.p_PJ[i]), quat=quaternion(tree.R_PJ[i]))
-    # principal axes; a right-handed set
-    moments, axes = np.linalg.eigh(tree.inertia[i])
-    axes[:, 0] *= np.sign(np.linalg.det(axes))
+    moments, axes = principal_axes(tree.inertia[i])
     inertia = {"mass": words(tree.mass[i]), "pos": words(tree.com[i]), "quat": quaternion(axes), "diaginertia": words(moments)}
     ElementTree.SubElement(body, "inertial", **inertia)
     if tree.kind[i] == FREE:

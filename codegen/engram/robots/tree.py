@@ -15,6 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from engram.inputs import InputError, closest
+from engram.robots.linear3 import product, turn_to
 from engram.robots.spec import RobotSpec, read_spec
 
 FREE, REVOLUTE, PRISMATIC = 0, 1, 2  # order of JointKind in controller/rbd/rbd_types.h
@@ -88,15 +89,6 @@ def load(name: str) -> Tree:
     return build(read_spec(name))
 
 
-def turn_to(axis: np.ndarray) -> np.ndarray:
-    """A rotation whose third column is `axis`; a cyclic permutation, without rounding, for an axis along x, y or z."""
-    i = int(np.argmax(np.abs(axis)))
-    x = np.eye(3)[(i + 1) % 3]
-    x = x - axis * (axis @ x)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(axis, x), axis])
-
-
 def build(spec: RobotSpec) -> Tree:
     """Load the URDF of `spec`, weld its locked joints and turn the joint frames. Raises InputError."""
     model, home = _load_model(spec)
@@ -111,10 +103,10 @@ def build(spec: RobotSpec) -> Tree:
     for i in reversed(range(nj)):
         R_parent = np.eye(3) if parent[i] < 0 else R_turn[parent[i]]
         placement, body = model.jointPlacements[i + 1], model.inertias[i + 1]
-        R_PJ[i] = R_parent.T @ placement.rotation @ R_turn[i]
-        p_PJ[i] = R_parent.T @ placement.translation
-        com[i] = R_turn[i].T @ body.lever
-        inertia[i] = R_turn[i].T @ body.inertia @ R_turn[i]
+        R_PJ[i] = product(R_parent.T, placement.rotation, R_turn[i])
+        p_PJ[i] = product(R_parent.T, placement.translation)
+        com[i] = product(R_turn[i].T, body.lever)
+        inertia[i] = product(R_turn[i].T, body.inertia, R_turn[i])
         if parent[i] >= 0:
             nsub[parent[i]] += nsub[i]
     sizes = np.where(kind == FREE, 7, 1), np.where(kind == FREE, 6, 1)
@@ -150,7 +142,7 @@ def build(spec: RobotSpec) -> Tree:
         R_JF=np.array([R for _, R, _ in frames]).reshape(-1, 3, 3),
         p_JF=np.array([p for _, _, p in frames]).reshape(-1, 3),
         sphere_joint=np.array([joint for (joint, _, _), _ in spheres], int),
-        p_JS=np.array([p + R @ row[:3] for (_, R, p), row in spheres]).reshape(-1, 3),
+        p_JS=np.array([p + product(R, row[:3]) for (_, R, p), row in spheres]).reshape(-1, 3),
         sphere_radius=np.array([row[3] for _, row in spheres]),
         R_turn=R_turn,
         continuous=continuous,
@@ -263,7 +255,8 @@ def _frame(spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link
     if frame.parentJoint == 0:
         raise spec.file.error(key, f"frame '{link}' does not move; name one on a moving body")
     joint = frame.parentJoint - 1
-    return joint, R_turn[joint].T @ frame.placement.rotation, R_turn[joint].T @ frame.placement.translation
+    R_JP = R_turn[joint].T
+    return joint, product(R_JP, frame.placement.rotation), product(R_JP, frame.placement.translation)
 
 
 def _check(spec: RobotSpec, tree: Tree) -> None:

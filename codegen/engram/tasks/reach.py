@@ -6,6 +6,7 @@ import numpy as np
 import pinocchio as pin
 
 from engram.inputs import InputError
+from engram.robots.linear3 import product
 from engram.tasks.spec import Region, TaskSpec, load_task
 
 STARTS = 24  # random starts of the inverse kinematics before a pose counts as out of reach
@@ -82,8 +83,8 @@ def draw_pose(region: Region, rng: np.random.Generator) -> tuple[np.ndarray, np.
         p_WT, y, z = mirror * p_WT, -mirror * R_WT[:, 1], mirror * R_WT[:, 2]
         R_WT = np.column_stack([np.cross(y, z), y, z])
     if region.flip and rng.random() < 0.5:
-        R_WT = R_WT @ np.diag([-1.0, -1.0, 1.0])
-    return p_WT, R_WT @ pin.exp3(region.tilt * rng.standard_normal(3))
+        R_WT = R_WT * [-1.0, -1.0, 1.0]
+    return p_WT, product(R_WT, pin.exp3(region.tilt * rng.standard_normal(3)))
 
 
 def task_vector(p_WT: np.ndarray, R_WT: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from engram.inputs import InputError, TomlFile, closest
 from engram.paths import MODELS
+from engram.robots.linear3 import unit
 from engram.robots.spec import known_robots, read_spec
 from engram.robots.tree import Tree, build
 from engram.tasks.world import Boxes, read_boxes
@@ -149,9 +150,9 @@ def _region(file: TomlFile, table: dict[str, Any]) -> Region:
     if np.any(lo > hi):
         raise file.error("lo", f"region '{table['name']}': a lower corner lies above the upper one")
     x = np.cross(y, z)
-    if np.linalg.norm(x) < 1e-6:
+    if np.abs(x).max() < 1e-6:
         raise file.error("y", f"region '{table['name']}': y and z must not be parallel")
-    x, z = x / np.linalg.norm(x), z / np.linalg.norm(z)
+    x, z = unit(x), unit(z)
     return Region(
         name=table["name"],
         share=float(file.numbers("share", table["share"], ())),
