@@ -189,9 +189,14 @@ def test_unreachable_region_is_named(models):
         sampler.sample(np.random.default_rng(0))
 
 
-def test_missing_meshes_and_names_are_answered(models, capsys):
-    assert run(models, "--meshes") == 2
-    assert "first run: engram robot panda --meshes" in capsys.readouterr().err
+def test_shown_scene_includes_what_was_written(models):
+    assert run(models, "--meshes") == 0
+    path = models.parent / "build" / "scene" / "panda_reach.xml"
+    includes = re.findall(r'include file="(.*?)"', path.read_text(encoding="utf-8"))
+    assert len(includes) == 2 and all((path.parent / include).is_file() for include in includes)
+
+
+def test_unknown_names_are_answered(models, capsys):
     assert main(["task", "panda", "rech", "--models", str(models)]) == 2
     assert "unknown task 'rech' of robot 'panda'; did you mean 'reach'?" in capsys.readouterr().err
 

@@ -27,6 +27,7 @@ def run(args: argparse.Namespace) -> int:
     """Write robot.h and robot.xml of every named robot; with --meshes also OBJ files and the MuJoCo model that shows them."""
     from engram.robots.emit_header import robot_header
     from engram.robots.emit_mjcf import robot_mjcf
+    from engram.robots.shown import write_shown
     from engram.robots.spec import read_spec
     from engram.robots.tree import build
 
@@ -41,22 +42,5 @@ def run(args: argparse.Namespace) -> int:
             f"robot:  {relative(folder)}/robot.h robot.xml  nq {tree.nq}  nv {tree.nv}  nu {tree.nu}  digest {tree.digest:016x}"
         )
         if args.meshes:
-            print(f"robot:  {write_meshes(spec, tree, args.build)}")
+            write_shown(spec, tree, args.build)
     return 0
-
-
-def write_meshes(spec, tree, build_folder: Path) -> str:
-    """Write <build>/meshes/<robot>/*.obj and <build>/scene/<robot>.xml, which shows them. Returns what was done."""
-    from engram.robots.emit_mjcf import robot_mjcf
-    from engram.robots.visuals import load_visuals, obj_text
-
-    meshes, scene = build_folder / "meshes" / tree.name, build_folder / "scene"
-    meshes.mkdir(parents=True, exist_ok=True)
-    scene.mkdir(parents=True, exist_ok=True)
-    visuals = load_visuals(spec, tree)
-    drawn = [visual for visual in visuals if visual.kind == "mesh"]
-    for visual in drawn:
-        (meshes / f"{visual.name}.obj").write_text(obj_text(visual), encoding="utf-8")
-    (scene / f"{tree.name}.xml").write_text(robot_mjcf(tree, visuals, f"../meshes/{tree.name}/"), encoding="utf-8")
-    faces = sum(len(visual.triangles) for visual in drawn)
-    return f"{relative(scene)}/{tree.name}.xml  {len(drawn)} meshes, {faces} triangles in {relative(meshes)}/"

@@ -3,12 +3,10 @@
 import argparse
 from pathlib import Path
 
-from engram.inputs import InputError
 from engram.paths import BUILD, MODELS, TABLES, relative
 
 EXAMPLES = """examples:
   engram task panda reach             constants of models/panda/reach/, and a scene with collision geoms only
-  engram robot panda --meshes &&
   engram task panda reach --meshes    also build/scene/panda_reach.xml, which shows the robot's meshes
 """
 
@@ -18,15 +16,19 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser = subparsers.add_parser("task", help=__doc__, description=__doc__, epilog=EXAMPLES)
     parser.add_argument("robot", help="folder of models/ that holds a robot.toml")
     parser.add_argument("task", help="folder of models/<robot>/ that holds a task.toml and a world.xml")
-    parser.add_argument("--meshes", action="store_true", help="also write the scene with visual meshes (for rendering)")
+    parser.add_argument(
+        "--meshes", action="store_true", help="also write the visual meshes and the scene that shows them (for rendering)"
+    )
     parser.add_argument("--models", type=Path, default=MODELS, help="where robots are described (default: models/)")
     parser.add_argument("--tables", type=Path, default=TABLES, help="where to write (default: tables/)")
-    parser.add_argument("--build", type=Path, default=BUILD, help="where meshes are and the shown scene goes (default: build/)")
+    parser.add_argument("--build", type=Path, default=BUILD, help="where to write meshes and the shown scene (default: build/)")
     return parser
 
 
 def run(args: argparse.Namespace) -> int:
     """Write task.h and scene.xml; with --meshes also the scene that shows the robot's meshes."""
+    from engram.robots.shown import write_shown
+    from engram.robots.spec import read_spec
     from engram.tasks.emit_header import task_header
     from engram.tasks.scene import scene_mjcf
     from engram.tasks.spec import load_task
@@ -41,10 +43,8 @@ def run(args: argparse.Namespace) -> int:
     sizes = f"vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}"
     print(f"task:   {relative(folder)}/task.h scene.xml  {sizes}  digest {spec.digest:016x}")
     if args.meshes:
-        shown = args.build / "scene"
-        if not (shown / f"{args.robot}.xml").is_file():
-            raise InputError(f"no {relative(shown)}/{args.robot}.xml; first run: engram robot {args.robot} --meshes")
-        path = shown / f"{args.robot}_{args.task}.xml"
-        path.write_text(scene_mjcf(spec, shown / f"{args.robot}.xml", world, shown), encoding="utf-8")
+        robot = write_shown(read_spec(args.robot, args.models), spec.robot, args.build)
+        path = robot.parent / f"{args.robot}_{args.task}.xml"
+        path.write_text(scene_mjcf(spec, robot, world, path.parent), encoding="utf-8")
         print(f"task:   {relative(path)}")
     return 0
