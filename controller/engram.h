@@ -184,7 +184,7 @@ engram_status engram_command(engram_controller* handle, int64_t utime, const dou
 
 // ---- what happened ----
 
-// The last cycle, complete after engram_feedback.
+// The last cycle that engram_feedback has ended.
 typedef struct engram_cycle {
   int64_t utime;                          // us, time of the plan's first knot
   int64_t seq;                            // counts cycles from 1

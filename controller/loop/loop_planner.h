@@ -38,7 +38,7 @@ template <class M> class Planner {
   engram_status prepare(int64_t utime);
   engram_status feedback(int64_t utime, const double* q, const double* v);
 
-  const engram_cycle& cycle() const { return cycle_; }
+  const engram_cycle& cycle() const { return finished_; }
   const engram_jump& jump() const { return jump_; }
   const Plan<P, N>& plan() const { return plan_; }
 
@@ -97,7 +97,7 @@ template <class M> class Planner {
   static_assert(M::Memory::kGuesses + 2 <= ENGRAM_GUESSES_MAX, "room for the memory's guesses and the loop's own two");
 
   bool prepared_ = false;        // cycle_ and stats_ belong to the period under way
-  engram_cycle cycle_ = {};
+  engram_cycle cycle_ = {}, finished_ = {};
   engram_jump jump_ = {};
   int64_t seq_ = 0;
 };
@@ -339,6 +339,7 @@ template <class M> engram_status Planner<M>::finish(engram_status status, engram
   cycle_.rollout_us = stats_.us[kRollout];
   cycle_.total_us += now() - begin;
   fast_.alive(cycle_.utime, status);
+  finished_ = cycle_;
   return status;
 }
 
