@@ -17,7 +17,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("robot", help="folder of models/ that holds a robot.toml")
     parser.add_argument("task", help="folder of models/<robot>/ that holds a task.toml and a world.xml")
     parser.add_argument(
-        "--meshes", action="store_true", help="also write the visual meshes and the scene that shows them (for rendering)"
+        "--meshes", action="store_true", help="also write the meshes and the scene that shows them"
     )
     parser.add_argument("--models", type=Path, default=MODELS, help="where robots are described (default: models/)")
     parser.add_argument("--tables", type=Path, default=TABLES, help="where to write (default: tables/)")
