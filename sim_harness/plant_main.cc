@@ -35,7 +35,6 @@ struct PlantOptions {
   int log_every = 10;     // steps
   double give_up = 10;    // s
   int resend_ms = 250;    // ms
-  double warm_up = 0.02;  // s before the first task
   double stale_ms = 20;   // ms
   double damping = 2.0;   // N m s/rad
   uint64_t robot_digest = 0;
@@ -63,7 +62,6 @@ PlantOptions read_options(int argc, char** argv) {
        {"--results", "FILE", "JSON: how each jump ended, and counts", &o.results},
        {"--give-up", "S", "lock step: end if no command comes for this long; default 10", &o.give_up},
        {"--resend-ms", "MS", "lock step: send the state again after this long; default 250", &o.resend_ms},
-       {"--warm-up", "S", "simulated time before the first task; default 0.02", &o.warm_up},
        {"--stale-ms", "MS", "wall clock: brake if the last command is older than this; default 20", &o.stale_ms},
        {"--damping", "D", "wall clock: joint damping while braking (N m s/rad); default 2", &o.damping},
        {"--robot-digest", "HEX", "digest of the robot, if neither scene nor series has it", &o.robot_digest},
@@ -153,7 +151,7 @@ bool Plant::finished() const {
 // Publishes what the controller shall know about time t, then finds out about time t itself.
 void Plant::begin_step() {
   Judge::Event event;
-  if (!o_.series.empty() && t_ >= o_.warm_up) event = judge_.begin_step(t_);
+  if (!o_.series.empty()) event = judge_.begin_step(t_);
   if (event.reset) {
     const double rest[kMaxDof] = {};
     state_.seq = 0;
