@@ -12,6 +12,7 @@ template <class R> struct LimitTerm {
   template <class S> struct Param {
     S limit_w_q, limit_w_v, limit_w_u;  // weights [1/rad^2, s^2/rad^2, 1/(N m)^2]
     S limit_margin_q;                   // the position barrier starts this far inside the limit [rad or m]
+    S limit_margin_v;                   // the velocity barrier starts this share of the limit inside it
   };
   template <class S> static S cost(const Param<S>& p, const KnotView<R, S>& k) {
     S c = 0.0;
@@ -37,7 +38,8 @@ template <class R> struct LimitTerm {
     for (int i = base; i < R::nv; ++i) {
       const int q = R::nq - R::nv + i;
       f(L::oq + i, p.limit_w_q, excess(k.q[q], S(R::q_lo[q]) + p.limit_margin_q, S(R::q_hi[q]) - p.limit_margin_q));
-      f(L::ov + i, p.limit_w_v, excess(k.v[i], S(-R::v_max[i]), S(R::v_max[i])));
+      const S v_edge = S(R::v_max[i]) * (S(1.0) - p.limit_margin_v);
+      f(L::ov + i, p.limit_w_v, excess(k.v[i], -v_edge, v_edge));
     }
     for (int i = 0; i < R::nu; ++i) f(L::ou + i, p.limit_w_u, excess(k.u[i], S(-R::u_max[i]), S(R::u_max[i])));
   }

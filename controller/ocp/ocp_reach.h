@@ -62,6 +62,7 @@ template <class T> void reach_knot(const ReachTarget& target, double dt, double 
   k.limit_w_v = end ? 0.0 : dt * T::run_velocity_limit;
   k.limit_w_u = end ? 0.0 : dt * T::run_torque_limit;
   k.limit_margin_q = T::margin_joint;
+  k.limit_margin_v = T::margin_velocity;
   k.obstacle_w = end ? T::end_collision : dt * T::run_collision;
   k.obstacle_margin = T::margin_collision;
 }

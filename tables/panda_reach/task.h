@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct PandaReach {
   using Robot = robots::Panda;
   static constexpr char name[] = "panda_reach";
-  static constexpr uint64_t digest = 0xbb18c6d901a644cb;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x916d3ad21e46c324;  // of the numbers below and of the robot's
   static constexpr Robot::Frame frame = Robot::kHandTcp;  // shall reach the target
 
   // task vector, in the order of task_t.value
@@ -49,8 +49,8 @@ struct PandaReach {
   static constexpr double run_velocity = 0x1.999999999999ap-5;  // 0.05
   static constexpr double run_torque = 0x1.0624dd2f1a9fcp-9;  // 0.002
   static constexpr double run_collision = 0x1.388p+14;  // 20000
-  static constexpr double run_joint_limit = 0x1.f4p+9;  // 1000
-  static constexpr double run_velocity_limit = 0x1.9p+5;  // 50
+  static constexpr double run_joint_limit = 0x1.388p+13;  // 10000
+  static constexpr double run_velocity_limit = 0x1.9p+7;  // 200
   static constexpr double run_torque_limit = 0x1p+0;  // 1
   static constexpr double end_position = 0x1.388p+13;  // 10000
   static constexpr double end_rotation = 0x1.f4p+9;  // 1000
@@ -62,6 +62,7 @@ struct PandaReach {
   // margins of the barriers
   static constexpr double margin_collision = 0x1.47ae147ae147bp-5;  // 0.04 m
   static constexpr double margin_joint = 0x1.999999999999ap-5;  // 0.05 rad
+  static constexpr double margin_velocity = 0x1.999999999999ap-4;  // 0.1 of the limit
 
   // later than arrival_time after a jump, the running pose weights grow by arrival_factor
   static constexpr double arrival_time = 0x1.8p+0;  // 1.5 s

@@ -45,6 +45,7 @@ def task_header(spec: TaskSpec) -> str:
         "  // margins of the barriers",
         *_scalar("margin_collision", spec.margins["collision"], "m"),
         *_scalar("margin_joint", spec.margins["joint"], "rad"),
+        *_scalar("margin_velocity", spec.margins["velocity"], "of the limit"),
         "",
         "  // later than arrival_time after a jump, the running pose weights grow by arrival_factor",
         *_scalar("arrival_time", spec.arrival["time"], "s"),

@@ -20,7 +20,7 @@ WEIGHTS = ["position", "rotation", "posture", "velocity", "torque", "collision",
 TERMINAL = [name for name in WEIGHTS if not name.startswith("torque") and name != "velocity_limit"]
 SECTIONS = {
     "horizon": ["knots", "dt"],
-    "margins": ["collision", "joint"],
+    "margins": ["collision", "joint", "velocity"],
     "arrival": ["time", "factor"],
     "success": ["position", "rotation", "time"],
 }
