@@ -7,6 +7,7 @@
 //   engram_bench gemm N                        GFLOP/s of Eigen's fixed-size double product under our flags
 //
 // Same input, same output, same order of entries as the programs of bench/peers. Writes one JSON object.
+#include "bench/counting.h"
 #include "bench/gemm.h"
 #include "bench/problems.h"
 #include "bench/stopwatch.h"
@@ -39,8 +40,7 @@ constexpr double kDisplacement = 1e-3;  // of the first state, in every tangent 
 
 constexpr int kMaxKnots = 100;
 
-template <class P>
-struct Problem {
+template <class P> struct Problem {
   Horizon<P, kMaxKnots> horizon;
   FddpWork<P, kMaxKnots> work;
   FddpSolution<P, kMaxKnots> solution;
@@ -48,9 +48,8 @@ struct Problem {
 };
 
 // Blocks of dense derivatives, row by row, as Crocoddyl stores them.
-template <class P>
-void append_dense(const KnotModel<typename P::Layout, P::kFreeBase, double>& m, double dt, bool terminal, double cost,
-                  std::vector<double> (&out)[8]) {
+template <class P> void append_dense(const KnotModel<typename P::Layout, P::kFreeBase, double>& m, double dt, bool terminal,
+                                     double cost, std::vector<double> (&out)[8]) {
   static_assert(!P::kFreeBase, "E and G are taken as identities");
   using L = typename P::Layout;
   auto& [costs, Fx, Fu, Lx, Lu, Lxx, Lxu, Luu] = out;
@@ -79,8 +78,39 @@ void append_dense(const KnotModel<typename P::Layout, P::kFreeBase, double>& m, 
   }
 }
 
-template <class P>
-void compare(Problem<P>& problem, const std::vector<double>& trajectory) {
+// Flops of the Riccati sweep at one knot, from the dimensions of its products (fddp_backward.h); lower triangles only.
+constexpr double backward_flops(int nv, int nu) {
+  const double v = nv, u = nu, x = 2 * v, z = x + u;
+  const double value = 4 * v * v;                                               // (Vqq, Vvq, Vvv) in (dq, dv')
+  const double action = 2 * v * v * z + 2 * v * v * v                           // Vvv D, Dq' (...)
+                        + 2 * v * (z * (z + 1) - v * (v + 1)) / 2 + 4 * v * z;  // rows v and u of D' W; gradients
+  const double gain = u * u * u / 3 + 2 * u * u * x + u * x * (x + 1);          // Cholesky, Y, K, Y'Y
+  return value + action + gain + 2 * u * (u + x);                               // k, Vx
+}
+
+// Flops of the phases over the horizon.
+template <class P> void report_flops(const Problem<P>& problem, Report& report) {
+  const auto& [h, w, s, stats] = problem;
+  using S = Counting;
+  typename P::template Knot<S> knot;
+  constexpr int knot_size = sizeof(typename P::template Knot<double>) / sizeof(double);
+  for (int e = 0; e < knot_size; ++e) reinterpret_cast<S*>(&knot)[e] = reinterpret_cast<const double*>(&h.knot[0])[e];
+  S x[P::nx], u[P::nu], x_next[P::nx], cost;
+  for (int i = 0; i < P::nx; ++i) x[i] = s.x[0][i];
+  for (int i = 0; i < P::nu; ++i) u[i] = s.u[0][i];
+  typename P::template Model<S> model;
+  const double linearize = count_flops([&] { P::linearize(knot, x, u, x_next, cost, model); });
+  const double calc = count_flops([&] { P::calc(knot, x, u, x_next, cost); });
+  const double calc_diff = (h.n + 1) * linearize, backward = h.n * backward_flops(P::nv, P::nu);
+  const double policy = 2.0 * P::nu * (P::ndx + 1) + P::ndx;
+  const double forward = kLanes * h.n * (calc + policy);
+  report.number("flops_calcdiff", calc_diff);
+  report.number("flops_backward", backward);
+  report.number("flops_forward", forward);
+  report.number("flops_solve1", calc_diff + backward + forward);
+}
+
+template <class P> void compare(Problem<P>& problem, const std::vector<double>& trajectory) {
   using L = typename P::Layout;
   auto& [h, w, s, stats] = problem;
   const int n = h.n;
@@ -124,12 +154,12 @@ void compare(Problem<P>& problem, const std::vector<double>& trajectory) {
   report.number("converged", fddp_solve(h, opts, w, s, stats) == FddpStatus::kConverged);
   report.number("iterations", stats.iterations);
   report.number("cost_converged", s.cost);
+  report_flops(problem, report);
   report.list("xs_converged", s.x[0], (n + 1) * P::nx);
   report.list("us_converged", s.u[0], n * P::nu);
 }
 
-template <class P>
-void time(Problem<P>& problem, int samples) {
+template <class P> void time(Problem<P>& problem, int samples) {
   using L = typename P::Layout;
   auto& [h, w, s, stats] = problem;
   FddpOpts opts;
@@ -164,13 +194,9 @@ void time(Problem<P>& problem, int samples) {
 
 // ---- rigid-body algorithms -----------------------------------------------------------------------------------------------
 
-template <class R>
-struct Sample {
-  const double *q, *v, *a, *tau;
-};
+template <class R> struct Sample { const double *q, *v, *a, *tau; };
 
-template <class R>
-std::vector<Sample<R>> split(const std::vector<double>& numbers) {
+template <class R> std::vector<Sample<R>> split(const std::vector<double>& numbers) {
   constexpr int size = R::nq + 3 * R::nv;
   if (numbers.size() % size) fail("samples of another robot");
   std::vector<Sample<R>> samples;
@@ -182,8 +208,7 @@ std::vector<Sample<R>> split(const std::vector<double>& numbers) {
 }
 
 // Results of all algorithms at one state (one state a lane when S = Pack).
-template <class R, class S>
-struct RigidBody {
+template <class R, class S> struct RigidBody {
   S q[R::nq], v[R::nv], a[R::nv], tau[R::nv];
   RbdData<R, S> d;
   S out[R::nv];
@@ -218,8 +243,7 @@ struct RigidBody {
   }
 };
 
-template <class R>
-void compare(const std::vector<double>& numbers) {
+template <class R> void compare(const std::vector<double>& numbers) {
   const auto samples = split<R>(numbers);
   constexpr int nv = R::nv;
   RigidBody<R, double> body;
@@ -251,6 +275,15 @@ void compare(const std::vector<double>& numbers) {
   report.list("rnea_derivatives_v", tau_v);
   report.list("aba_derivatives_q", acc_q);
   report.list("aba_derivatives_v", acc_v);
+
+  RigidBody<R, Counting> counted;
+  counted.load(samples, 0);
+  report.number("flops_fk", count_flops([&] { counted.fk(); }));
+  report.number("flops_rnea", count_flops([&] { counted.rnea(); }));
+  report.number("flops_aba", count_flops([&] { counted.aba(); }));
+  report.number("flops_crba", count_flops([&] { counted.crba(); }));
+  report.number("flops_rnea_derivatives", count_flops([&] { counted.rnea_derivatives(); }));
+  report.number("flops_aba_derivatives", count_flops([&] { counted.aba_derivatives(); }));
 }
 
 // The samples are loaded before the clock starts: a lane's state arrives in lanes from the solver, too.
@@ -276,8 +309,7 @@ void time(Report& report, const std::string& suffix, const std::vector<Sample<R>
   measure("aba_derivatives", &Body::aba_derivatives);
 }
 
-template <class R>
-void time(const std::vector<double>& numbers, int passes) {
+template <class R> void time(const std::vector<double>& numbers, int passes) {
   const auto samples = split<R>(numbers);
   Report report;
   time<R, double>(report, "", samples, passes);

@@ -8,8 +8,7 @@
 
 namespace bench {
 
-template <int size>
-std::vector<double> gemm_us(int n) {
+template <int size> std::vector<double> gemm_us(int n) {
   using Matrix = Eigen::Matrix<double, size, size>;
   // static: the largest sizes exceed Eigen's limit for the stack
   alignas(64) static double a[size * size], b[size * size], c[size * size];

@@ -132,7 +132,7 @@ class Figures:
         self.rows: list[dict] = []
 
     def title(self, text: str) -> None:
-        print(f"\n{text}\n  {'us':<18}{'ours min':>11} {'median':>9} {'p99':>9} {'worst':>9}   "
+        print(f"\n{text}\n  {'us':<22}{'ours min':>11} {'median':>9} {'p99':>9} {'worst':>9}   "
               f"{'peer min':>9} {'median':>9} {'p99':>9} {'worst':>9}   {'ratio':>6}  {'GFLOP/s':>7}")
 
     def add(self, group: str, name: str, ours: Samples, peer: Samples | None, holds: bool, flops: float | None) -> None:
@@ -144,7 +144,7 @@ class Figures:
         self.rows.append(row)
         ratio = f"{row['ratio']:6.2f}" if "ratio" in row else " " * 6
         rate = f"{flops / ours.median * 1e-3:7.1f}" if flops else ""
-        print(f"  {name:<18}  {ours.row()}   {peer.row() if peer else ' ' * 39}   {ratio}  {rate}")
+        print(f"  {name:<22}  {ours.row()}   {peer.row() if peer else ' ' * 39}   {ratio}  {rate}")
 
     def write(self, path: Path) -> None:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -224,7 +224,7 @@ class Bench:
             self.figures.add(robot, f"{name}_lanes", mine[f"{name}_lanes"], best, holds, flops)
 
     def gemm(self) -> None:
-        """The limit: the best rate of a matrix product, under our flags and under the machine's own."""
+        """The limit of arithmetic: the best rate of a matrix product, under our flags and under the machine's own."""
         mine, peer = alternate(1, [self.ours, "gemm", 50], [self.peers / "pinocchio_bench", "-", "gemm", 50])
         rate = {
             side: max(2 * int(name.removeprefix("gemm")) ** 3 / s.us.min() * 1e-3 for name, s in samples.items())

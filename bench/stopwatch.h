@@ -15,8 +15,7 @@
 namespace bench {
 
 // Durations of `n` calls of f after three warm-up calls, in microseconds, divided by `batch` (the pieces of work in one call).
-template <class F>
-std::vector<double> sample_us(int n, F&& f, double batch = 1) {
+template <class F> std::vector<double> sample_us(int n, F&& f, double batch = 1) {
   using Clock = std::chrono::steady_clock;
   for (int i = 0; i < 3; ++i) f();
   std::vector<double> us(n);
@@ -29,10 +28,7 @@ std::vector<double> sample_us(int n, F&& f, double batch = 1) {
 }
 
 // Keeps a result alive without storing it.
-template <class T>
-inline void keep(const T& value) {
-  asm volatile("" : : "g"(&value) : "memory");
-}
+template <class T> inline void keep(const T& value) { asm volatile("" : : "g"(&value) : "memory"); }
 
 // Whitespace-separated numbers of a text file; ends the program if there are none.
 inline std::vector<double> read_numbers(const char* path) {

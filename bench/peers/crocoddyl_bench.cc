@@ -19,8 +19,7 @@ constexpr int kMaxIterations = 200;
 constexpr double kDisplacement = 1e-3;  // of the first state, in every tangent direction: what one control period sees
 
 // Row-major entries of all matrices, one after the other.
-template <class Matrices>
-std::vector<double> flat(const Matrices& matrices) {
+template <class Matrices> std::vector<double> flat(const Matrices& matrices) {
   std::vector<double> numbers;
   for (const auto& m : matrices)
     for (int i = 0; i < m.rows(); ++i)

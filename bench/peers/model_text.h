@@ -17,8 +17,7 @@ struct RobotModel {
 namespace model_text {
 
 // Row-major, as the file is.
-template <class Matrix>
-inline Matrix read(std::istream& in) {
+template <class Matrix> inline Matrix read(std::istream& in) {
   Matrix m;
   for (int i = 0; i < m.rows(); ++i)
     for (int j = 0; j < m.cols(); ++j) in >> m(i, j);
