@@ -1,6 +1,9 @@
 #include "controller/io/io_inbox.h"
 
 namespace engram::io {
+namespace {
+constexpr int64_t kLatest = int64_t{1} << 52;  // us, more than a century: a later time is no time
+}
 
 bool Inbox::good(Decoded decoded) {
   if (decoded == Decoded::kGood) return true;
@@ -17,7 +20,7 @@ Verdict Inbox::state(const void* bytes, uint32_t size, engram_msg_state_t* state
   };
   if (static_cast<uint64_t>(heard.robot_digest) != about_.robot_digest) return refuse(Trouble::kRobotDigest);
   if (heard.nq != about_.nq || heard.nv != about_.nv) return refuse(Trouble::kShape);
-  if (heard.seq < 1 || heard.utime < 0) return refuse(Trouble::kOutOfOrder);
+  if (heard.seq < 1 || heard.utime < 0 || heard.utime > kLatest) return refuse(Trouble::kOutOfOrder);
 
   Verdict verdict = Verdict::kNew;
   if (heard.seq == state_seq_ && heard.utime == state_utime_) {
@@ -46,7 +49,7 @@ Verdict Inbox::task(const void* bytes, uint32_t size, engram_msg_task_t* task) {
   };
   if (static_cast<uint64_t>(heard.task_digest) != about_.task_digest) return refuse(Trouble::kTaskDigest);
   if (heard.n != about_.ntask) return refuse(Trouble::kShape);
-  if (heard.seq < 1) return refuse(Trouble::kOutOfOrder);
+  if (heard.seq < 1 || heard.utime < 0 || heard.utime > kLatest) return refuse(Trouble::kOutOfOrder);
   if (heard.seq == task_seq_) return Verdict::kDuplicate;  // a sender may repeat its task for late listeners: not worth a word
   if (heard.seq < task_seq_) return refuse(Trouble::kOutOfOrder);
   task_seq_ = heard.seq;
