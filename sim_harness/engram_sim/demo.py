@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from engram.inputs import InputError
-from engram.paths import BUILD, ROOT, relative
+from engram.paths import ROOT, relative
 from engram.tasks.spec import load_task
 from engram_sim import report, suboptimality, video
 from engram_sim.motion import Motion
@@ -49,13 +49,13 @@ def demo(args: argparse.Namespace) -> int:
     drawn = None
     if args.video > 0:
         drawn = video.render(runs, video.shown_scene(args.robot, args.task), folder / "demo.mp4", spec.frame, args.video, args.jobs)
-    finish(folder, runs, header, drawn, time.monotonic() - start)
+    finish(folder, runs, header, drawn, time.monotonic() - start, args.figures)
     return 0 if len(done) == len(modes) and all(code == 0 for code in codes.values()) else 1
 
 
 def run_modes(args: argparse.Namespace, modes: list[str], folder: Path, series: Path) -> dict[str, int]:
     """Run all modes, `args.jobs` at a time; the exit code of each mode's plant."""
-    options = [word for pair in args.plant_option for word in plant_option(pair)]
+    options = [word for option in args.plant_option for word in plant_option(option)]
     progress = Progress(len(modes) * args.jumps, "run   ")
     ended: dict[str, list[bool]] = {mode: [] for mode in modes}
 
@@ -95,7 +95,7 @@ def point_latest(folder: Path) -> None:
         os.symlink(folder.name, latest)
 
 
-def finish(folder: Path, runs: list[Run], header: dict[str, Any], drawn: Path | None, seconds: float) -> None:
+def finish(folder: Path, runs: list[Run], header: dict[str, Any], drawn: Path | None, seconds: float, figures_folder: Path) -> None:
     """Write summary.json, report.html and the figures; print the summary."""
     curves = suboptimality.curves(runs, header["robot"], header["task"])
     for run in runs:
@@ -104,8 +104,8 @@ def finish(folder: Path, runs: list[Run], header: dict[str, Any], drawn: Path | 
     summary = header | {"wall_s": round(seconds, 1), "modes": {run.mode: run.summary() for run in runs}}
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     records = figures(header["robot"], runs)
-    (BUILD / "figures").mkdir(parents=True, exist_ok=True)
-    (BUILD / "figures" / "demo.json").write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
+    figures_folder.mkdir(parents=True, exist_ok=True)
+    (figures_folder / "demo.json").write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
 
     spec = load_task(header["robot"], header["task"])
     motions = [Motion(run, spec.robot, spec.frame) for run in runs]
@@ -140,12 +140,12 @@ def read_summary(folder: Path) -> dict[str, Any]:
         raise InputError(f"{relative(folder)}/summary.json: cannot be read ({error}); give the folder of a demo") from None
 
 
-def report_again(folder: Path) -> int:
+def report_again(folder: Path, figures_folder: Path) -> int:
     """Write the report of a finished demo again."""
     folder = folder.resolve()
     header = read_summary(folder)
     drawn = folder / "demo.mp4"
-    finish(folder, read_runs(folder), header, drawn if drawn.is_file() else None, header["wall_s"])
+    finish(folder, read_runs(folder), header, drawn if drawn.is_file() else None, header["wall_s"], figures_folder)
     return 0
 
 

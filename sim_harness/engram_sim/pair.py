@@ -73,7 +73,10 @@ class Pair:
         (self.folder / "pair.json").write_text(json.dumps(calls, indent=1) + "\n", encoding="utf-8")
 
         with open(self.folder / "controller.txt", "w") as said, open(self.folder / "plant.txt", "w") as plant_said:
-            controller = subprocess.Popen(controller_call, stdout=said, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+            try:
+                controller = subprocess.Popen(controller_call, stdout=said, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
+            except OSError as error:
+                raise InputError(f"{controller_call[0]}: cannot be started ({error.strerror}); give a program to --controller") from None
             plant = subprocess.Popen(plant_call, stdout=subprocess.PIPE, stderr=plant_said, stdin=subprocess.DEVNULL, text=True)
             try:
                 for line in plant.stdout:

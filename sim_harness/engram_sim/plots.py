@@ -175,15 +175,15 @@ def cycle_times(runs: list[Run], period_us: float = 1e4) -> str | None:
     return svg(fig)
 
 
-def phases(run: Run) -> str | None:
-    """Where the CPU time of a cycle goes: means of ordinary cycles and of cycles that query the memory."""
-    timing = run.timing
+def phases(motion: Motion) -> str | None:
+    """Where the CPU time of a cycle goes: means of ordinary cycles and of those that answer a jump."""
+    timing = motion.run.timing
     if not len(timing.get("total_us", [])) or timing["total_us"].max() <= 0:
         return None
     names = ["query", "candidates", "linearize", "backward", "rollout"]
-    asked = timing["query_us"] > 0
+    jumped = np.isin(timing["utime"], motion.jump_cycles()["utime"].astype(float))
     fig, ax = figure(5.6, 1.9)
-    rows = [(label, mask) for label, mask in (("with a query", asked), ("without", ~asked)) if mask.any()]
+    rows = [(label, mask) for label, mask in (("at a jump", jumped), ("ordinary", ~jumped)) if mask.any()]
     for y, (_, mask) in enumerate(reversed(rows)):
         left = 0.0
         parts = [float(timing[f"{name}_us"][mask].mean()) for name in names]
@@ -214,7 +214,7 @@ def torques(motion: Motion) -> str | None:
     ax.set_xticks(x, [str(i + 1) for i in x])
     ax.set(xlabel="joint", ylabel="torque over its limit (%)", ylim=(0, 105))
     ax.grid(axis="x", visible=False)
-    ax.legend(loc="upper right")
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     return svg(fig)
 
 

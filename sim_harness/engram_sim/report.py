@@ -149,7 +149,7 @@ def write(folder: Path, runs: list[Run], motions: list[Motion], summary: dict[st
         (plots.candidates(first), "Merit by candidate.", f"What each kind of guess was worth at jumps in mode {first.run.mode}."),
         (plots.winners(motions), "Winners.", "Which guess seeded the solver at jumps."),
         (plots.cycle_times(runs), "Cycle time.", "CPU time of a control period, all phases. Dotted: the period."),
-        (plots.phases(runs[0]), "Phases.", f"Where the CPU time goes in mode {runs[0].mode}."),
+        (plots.phases(first), "Phases.", f"Where the CPU time goes in mode {first.run.mode}."),
         (plots.torques(first), "Torque.", f"Commanded torque over its limit in mode {first.run.mode}."),
     ]  # fmt: skip
     figures = "".join(f"<figure>{chart}<figcaption><b>{title}</b> {text}</figcaption></figure>" for chart, title, text in charts if chart)

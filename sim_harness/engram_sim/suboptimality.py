@@ -1,28 +1,121 @@
-"""How far the guess and the first iterations at a jump are from the best known solution of the same problem."""
+"""How far the guess and the first iterations at a jump are from the best known solution of the same problem.
 
+The controller writes, for each jump, the problem (state, task vector) and the merit of its guess and after each iteration. J* is the lowest
+cost among what the controller itself reached there and what converges from a cold start, from straight lines and from detours.
+"""
+
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from engram_sim.pair import Progress
 from engram_sim.results import Run
 
-ITERATIONS = 10  # after the guess, that are looked at
+ITERATIONS = 10  # that are shown
+IK_STARTS = 22  # postures from which inverse kinematics looks for ends of lines
+SMALL_CHUNK = 8
 
 
-def merits(path: Path) -> dict[int, np.ndarray]:
-    """jumps.csv of engram-controller: merit of the guess and after each iteration, by jump."""
+@dataclass(frozen=True)
+class Jump:
+    """A row of jumps.csv: problem (state (nx), task vector) and merits (of the guess, after 1, 2, ... iterations)."""
+
+    jump: int
+    winner: str
+    x0: np.ndarray
+    task: np.ndarray
+    merits: np.ndarray
+
+
+def read_jumps(path: Path) -> list[Jump]:
+    """jumps.csv of engram-controller; empty if there is none. An unfinished last line is left out."""
     if not path.is_file():
-        return {}
+        return []
     header, *lines = path.read_text(encoding="utf-8").splitlines() or [""]
-    first = header.split(",").index("merits") if "merits" in header.split(",") else 0
-    found = {}
+    names = header.split(",")
+    columns = {start: [i for i, name in enumerate(names) if name.startswith(start)] for start in ("x0_", "task_", "merits")}
+    jumps = []
     for line in lines:
         words = line.split(",")
-        if first and len(words) > first:
-            found[int(words[0])] = np.array(words[first:], dtype=float)
+        if len(words) >= len(names):
+            x0, task = (np.array([float(words[i]) for i in columns[start]]) for start in ("x0_", "task_"))
+            merits = np.array([float(word) for word in words[columns["merits"][0] :]])
+            jumps.append(Jump(int(words[0]), words[2], x0, task, merits))
+    return jumps
+
+
+_solver = None
+
+
+def _start(robot: str, task: str) -> None:
+    global _solver
+    from engram.data.reach import ReachSolver, Settings
+    from engram.tasks.spec import load_task
+
+    _solver = ReachSolver(load_task(robot, task), 0, Settings())
+
+
+def best_cost(x0: np.ndarray, task: np.ndarray) -> float:
+    """Lowest converged cost of the problem from a cold start, straight lines and detours; infinite if none converges."""
+    from engram.data.reach import detour
+
+    nq = len(_solver.q_lo)
+    rng = np.random.default_rng(0)
+    starts = np.vstack([x0[:nq], rng.uniform(_solver.q_lo, _solver.q_hi, (IK_STARTS, nq))])
+    ends = _solver.ends(task, starts)
+    _solver.problem.set(x0, task)
+    cold = _solver.problem.hold()
+    guesses = [(cold["xs"], cold["us"])]
+    if len(ends):
+        lines = _solver.problem.line(ends)
+        detours = _solver.problem.warp(detour(x0[:nq], _solver.spec.robot.q_home, ends, _solver.spec.knots), ends)
+        for (xs, us), count in ((lines, _solver.settings.lines), (detours, _solver.settings.detours)):
+            chosen = np.argsort(_solver.problem.merit(xs, us), kind="stable")[:count]
+            guesses += [(xs[i], us[i]) for i in chosen]
+    costs = [np.inf]
+    for xs, us in guesses:
+        found = _solver.problem.solve(xs, us, iterations=_solver.settings.iterations, stop=_solver.settings.stop)
+        if found["converged"]:
+            costs.append(float(found["cost"]))
+    return min(costs)
+
+
+def _best_costs(problems: list[tuple[np.ndarray, np.ndarray]]) -> list[float]:
+    return [best_cost(x0, task) for x0, task in problems]
+
+
+def curves(runs: list[Run], robot: str, task: str, jobs: int = 2) -> dict[str, np.ndarray]:
+    """Suboptimality (merit - J*) / J* by mode: (jumps, ITERATIONS + 1); a jump that converged early keeps its last value.
+
+    Modes without jumps.csv are left out; without a compiled engine all are.
+    """
+    jumps = {run.mode: read_jumps(run.folder / "jumps.csv") for run in runs}
+    jumps = {mode: rows for mode, rows in jumps.items() if rows}
+    if not jumps:
+        return {}
+    try:
+        _start(robot, task)
+    except ImportError as error:
+        print(f"suboptimality is left out: {error}")
+        return {}
+    problems = [(row.x0, row.task) for rows in jumps.values() for row in rows]
+    chunks = [problems[i : i + SMALL_CHUNK] for i in range(0, len(problems), SMALL_CHUNK)]
+    progress, best = Progress(len(problems), "best  "), []
+    with ProcessPoolExecutor(jobs, initializer=_start, initargs=(robot, task)) as pool:
+        for costs in pool.map(_best_costs, chunks):
+            best += costs
+            progress.show(len(best))
+    found, first = {}, 0
+    for mode, rows in jumps.items():
+        found[mode] = np.array([suboptimality(row.merits, cost) for row, cost in zip(rows, best[first:])])
+        first += len(rows)
     return found
 
 
-def curves(runs: list[Run], robot: str, task: str) -> dict[str, np.ndarray]:
-    """Suboptimality (merit - J*) / J* by mode: (jumps, ITERATIONS + 1). Empty for modes without jumps.csv."""
-    return {}
+def suboptimality(merits: np.ndarray, best: float) -> np.ndarray:
+    """(ITERATIONS + 1) values (merit - J*) / J*, J* the lower of `best` and of the merits themselves; the last one is repeated."""
+    lowest = min(best, merits.min())
+    padded = np.concatenate([merits, np.full(ITERATIONS + 1, merits[-1])])[: ITERATIONS + 1]
+    return (padded - lowest) / lowest

@@ -3,6 +3,8 @@
 import argparse
 from pathlib import Path
 
+from engram.paths import BUILD
+
 EXAMPLES = """examples:
   engram demo                                 300 jumps of the Panda in each mode, into runs/<time>/
   engram demo --seed 7 --jumps 60             another, shorter series
@@ -24,6 +26,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--log-full", type=float, default=20.0, help="s of the log with every state, for `engram replay` (default: 20)")
     parser.add_argument("--video", type=float, default=30.0, help="s of video; 0: none (default: 30)")
     parser.add_argument("--plant-option", action="append", default=[], metavar="OPTION=VALUE", help="for engram-plant, e.g. noise-v=0.01")
+    parser.add_argument("--figures", type=Path, default=BUILD / "figures", help="where demo.json goes (default: build/figures/)")
     parser.add_argument("--controller", type=Path, help="program to run (default: engram-controller of the build)")
     return parser
 
