@@ -3,9 +3,10 @@
 // What is remembered of a motion is its posture at the end and its bow: how it deviates from the minimum-jerk straight line between
 // its own ends. Bent to another start and another end, the bow stays (memory_warp.h). Kinds of guesses:
 //
-//   neighbour   one of the remembered motions nearest in task space, bent to the measured state and to the goal
-//   regression  end and bow predicted by a Gaussian process over all of them, bent likewise
+//   neighbour   end and bow of one of the motions nearest in task space; inverse kinematics corrects the end for the goal
 //   line        no bow: a straight line to an inverse kinematics solution
+//   regression  the same end as a line, and the bow that a Gaussian process predicts between start and end. (Between given ends
+//               the bow is nearly unique; as a function of the task alone it has many modes, which regression would average.)
 //
 // Every guess is a motion without gaps: velocities are those of the path, controls its inverse dynamics. The memory composes
 // guesses; it does not rank them: that is the merit's business, in loop/.
@@ -28,7 +29,7 @@ namespace engram {
 // The tables of one robot and task.
 struct MemoryTables {
   const TabKnn* knn;      // memory_features -> end posture (nq), coefficients of the bow (m)
-  const TabGpr* gpr;      // the same map
+  const TabGpr* gpr;      // memory_bow_features -> coefficients of the bow (m)
   const TabPca* bow;      // coefficients of the bow (m) -> its weights over time (k, nq)
   const TabRbf* time;     // the Gaussians over time, nq channels; its domain [0, T] is the length of a remembered motion
   const TabLogit* trust;  // memory_trust_inputs -> probability that the solver succeeds
@@ -36,24 +37,25 @@ struct MemoryTables {
 
 enum class GuessKind : int32_t { kNeighbour, kRegression, kLine };
 
-inline constexpr int kMemoryNeighbours = 10;  // most neighbours of a query
-inline constexpr int kMemoryLines = 3;        // to the best neighbour's posture, to one found from home, to one found from here
-inline constexpr int kMemoryGuesses = kMemoryNeighbours + 1 + kMemoryLines;
+inline constexpr int kMemoryPool = 24;       // samples looked up; those whose end cannot be corrected make room for the next
+inline constexpr int kMemoryNeighbours = 8;  // most neighbours of an answer
+inline constexpr int kMemoryLines = 3;       // to the end of the best neighbour, to one found from home, to one found from here
+inline constexpr int kMemoryGuesses = kMemoryNeighbours + 2 * kMemoryLines;
 
 struct MemoryOpts {
   int neighbours = kMemoryNeighbours;  // 0 .. kMemoryNeighbours
-  bool regression = true;
-  int lines = kMemoryLines;     // 0 .. kMemoryLines; the first needs neighbours
-  double max_warp = 1.2;        // [rad] a goal correction that turns a joint further refuses the guess
+  int lines = kMemoryLines;            // 0 .. kMemoryLines; the first needs neighbours
+  bool regression = true;              // a regression beside every line
+  double max_warp = 1.2;               // [rad] a neighbour whose end must turn a joint further is refused
 };
 
 template <class Task> struct Guess {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots;
   GuessKind kind;
-  int32_t source;  // neighbour: index of its sample; line: its number; regression: 0
+  int32_t source;  // neighbour: index of its sample; line, regression: 0 best neighbour's end, 1 found from home, 2 from here
   double trust;    // [0, 1] estimated probability that the solver succeeds from here
-  double warp;     // [rad] largest joint correction of the end
+  double warp;     // [rad] largest joint difference between its end and where inverse kinematics started
   double x[N + 1][R::nq + R::nv];  // states at the knots; x[0] is the measured state
   double u[N][R::nu];              // controls that drive x (inverse dynamics), not clamped
 };
@@ -61,10 +63,10 @@ template <class Task> struct Guess {
 // What a query found. Every query writes all but the guesses beyond n.
 template <class Task> struct MemoryAnswer {
   int32_t n;          // guesses
-  int32_t refused;    // neighbours and regressions whose end could not be bent to the goal
+  int32_t refused;    // samples looked up whose end could not be corrected for the goal
   TabStatus status;   // kTabOutside: the task lies outside the tables' domain; kTabNotFinite: no guesses
   double distance;    // to the nearest sample, scaled [-]; infinite if the memory was not asked
-  double deviation;   // of the regression, relative to its prior: 0 (known) .. 1 (unknown); 1 if it was not asked
+  double deviation;   // of the surest regression, relative to its prior: 0 (known) .. 1 (unknown); 1 if it was not asked
   Guess<Task> guess[kMemoryGuesses];
 };
 
@@ -80,8 +82,8 @@ template <class Task> struct MemoryWork;
 //   n      knots with a control, 1 <= n <= Task::nknots
 //   t      (n + 1) knot times from now [s], t[0] = 0, increasing
 //
-// Guesses come in the order neighbours (nearest first), regression, lines; refused ones are left out. An x0, goal or t that is not
-// finite gives no guess. Defined in memory_query.h.
+// Guesses come in the order neighbours (nearest first), lines, regressions. An x0, goal or t that is not finite (or
+// beyond 1e6) gives none. Defined in memory_query.h.
 template <class Task>
 void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, int n,
                   const double* t, MemoryWork<Task>& work, MemoryAnswer<Task>& answer);

@@ -17,9 +17,9 @@ template <class Task> TabStatus memory_check(const MemoryTables& tables, char* t
   for (const auto& table : expected) {
     if (tab_check(table.head, table.kind, R::digest, Task::digest, text) != kTabOk) return kTabBad;
   }
-  const int outputs = R::nq + tables.bow->m;  // end posture, coefficients of the bow
-  const bool fit = tables.knn->d == kMemoryFeatures<Task> && tables.gpr->d == kMemoryFeatures<Task> &&
-                   tables.knn->m == outputs && tables.gpr->m == outputs && outputs <= kMemoryMaxOutputs &&
+  const int m = tables.bow->m;
+  const bool fit = tables.knn->d == kMemoryFeatures<Task> && tables.knn->m == R::nq + m &&  //
+                   tables.gpr->d == kMemoryBowFeatures<Task> && tables.gpr->m == m && m <= kMemoryMaxBow &&
                    tables.time->nchannel == R::nq && tables.bow->n == tables.time->k * R::nq &&
                    tables.trust->d == kMemoryTrustInputs;
   if (fit) return kTabOk;

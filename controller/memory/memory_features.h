@@ -19,10 +19,22 @@ template <class Task> void memory_features(const double* q, const ReachTarget& g
   }
 }
 
-// Most outputs of the k-NN and GPR tables: end posture and coefficients of the bow
-inline constexpr int kMemoryMaxOutputs = 96;
+// start q (nq), end q (nq), target position p_WT (3) [m]
+template <class Task> inline constexpr int kMemoryBowFeatures = 2 * Task::Robot::nq + 3;
 
-// Inputs of the trust table: distance of the sample, deviation of the regression, warp at the goal [rad], is it a regression, a line
+template <class Task> void memory_bow_features(const double* start, const double* end, const ReachTarget& goal, double* x) {
+  constexpr int nq = Task::Robot::nq;
+  for (int i = 0; i < nq; ++i) {
+    x[i] = start[i];
+    x[nq + i] = end[i];
+  }
+  for (int i = 0; i < 3; ++i) x[2 * nq + i] = goal.p[i];
+}
+
+inline constexpr int kMemoryMaxBow = TAB_MAX_IN;  // most coefficients of a bow
+
+// Inputs of the trust table: distance of the (nearest) sample, deviation of the regression (0 for others), warp [rad], is it a
+// regression, is it a line
 inline constexpr int kMemoryTrustInputs = 5;
 
 inline void memory_trust_inputs(double distance, double deviation, double warp, GuessKind kind, double* x) {

@@ -1,4 +1,4 @@
-// One query of the memory, in five steps: look up, find end postures, decode, bend, make it a motion.
+// One query of the memory: look up, correct the ends, find lines and regressions, decode, bend, make it a motion.
 #ifndef CONTROLLER_MEMORY_MEMORY_QUERY_H_
 #define CONTROLLER_MEMORY_MEMORY_QUERY_H_
 
@@ -12,93 +12,69 @@ namespace engram {
 
 template <class Task> struct MemoryWork {
   using R = typename Task::Robot;
-  static constexpr int N = Task::nknots;
+  static constexpr int N = Task::nknots, nq = R::nq;
+  static constexpr int kSlots = kMemoryPool + 2 * kMemoryLines;
   // A guess in the making.
   struct Slot {
     GuessKind kind;
     int32_t source;
-    const float* remembered;  // end posture (nq), coefficients of the bow; null: no bow
-    double distance;          // of its sample [-]
-    double start[R::nq];      // where inverse kinematics starts
-    double end[R::nq];        // where it ends: the goal posture
-    bool reached;             // within kMemoryIkTolerance
+    const float* bow;   // its coefficients (m); null: no bow
+    double distance;    // of the (nearest) sample [-]
+    double deviation;   // of the regression; 0 for others
+    double start[nq];   // where inverse kinematics starts
+    double end[nq];     // where it ends
+    bool reached;       // within kMemoryIkTolerance of the goal
     double trust_inputs[kMemoryTrustInputs];
   };
-  Slot slot[kMemoryGuesses + kLanes];  // padded with copies to whole packs
-  double features[kMemoryFeatures<Task>];
-  int32_t index[kMemoryNeighbours];
-  float distance2[kMemoryNeighbours];
-  alignas(64) float regression[kMemoryMaxOutputs];
-  alignas(64) float weights[TAB_RBF_MAX_K * R::nq + TAB_LANES];  // of a bow
+  Slot slot[kSlots];
+  double features[kMemoryFeatures<Task>], bow_features[kMemoryBowFeatures<Task>];
+  int32_t index[kMemoryPool];
+  float distance2[kMemoryPool];
+  alignas(64) float regression[kMemoryLines][kMemoryMaxBow + TAB_LANES];
+  alignas(64) float weights[TAB_RBF_MAX_K * nq + TAB_LANES];  // of a bow over time
   double basis[(N + 1) * TAB_RBF_MAX_K];
-  double bow[N + 1][R::nq];
-  Pack path[N + 1][R::nq];  // kLanes guesses side by side
+  double bow[N + 1][nq];
+  Pack path[N + 1][nq];  // kLanes guesses side by side
   RbdData<R, Pack> rbd;
 };
 
 inline constexpr double kMemoryIkTolerance = 1e-3;  // [m, rad] an end farther from the goal counts as not reached
 inline constexpr double kMemoryFar = 1e3;           // distance that stands for "no sample at all"
+inline constexpr double kMemoryHuge = 1e6;          // no state, goal or time is that large
 
 // The steps of memory_query.
 namespace memory {
 
-inline bool finite(const double* x, int n) {
+inline bool usable(const double* x, int n) {
   for (int i = 0; i < n; ++i) {
-    if (!std::isfinite(x[i])) return false;
+    if (!(std::fabs(x[i]) < kMemoryHuge)) return false;
   }
   return true;
 }
 
-// Nearest samples, regression and lines -> w.slot; returns how many.
+// The next slot.
 template <class Task>
-int look_up(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, MemoryWork<Task>& w,
-            MemoryAnswer<Task>& answer) {
-  using R = typename Task::Robot;
-  int slots = 0;
-  const auto add = [&](GuessKind kind, int32_t source, const float* remembered, double distance) {
-    auto& slot = w.slot[slots++];
-    slot.kind = kind;
-    slot.source = source;
-    slot.remembered = remembered;
-    slot.distance = distance;
-    if (remembered != nullptr) {
-      for (int i = 0; i < R::nq; ++i) slot.start[i] = remembered[i];
-    }
-  };
-  memory_features<Task>(x0, goal, w.features);
-  if (opts.neighbours > 0) {
-    answer.status = tab_knn_query(tables.knn, w.features, opts.neighbours, w.index, w.distance2);
-    answer.distance = std::sqrt(w.distance2[0]);
-    for (int i = 0; i < opts.neighbours && w.index[i] >= 0; ++i) {
-      add(GuessKind::kNeighbour, w.index[i], tab_knn_value(tables.knn, w.index[i]), std::sqrt(w.distance2[i]));
-    }
-  }
-  if (opts.regression) {
-    float variance;
-    answer.status = tab_worse(answer.status, tab_gpr_query(tables.gpr, w.features, w.regression, &variance));
-    answer.deviation = std::sqrt(variance / (tables.gpr->variance + tables.gpr->noise));
-    add(GuessKind::kRegression, 0, w.regression, answer.distance);
-  }
-  for (int line = 0; line < opts.lines; ++line) {
-    if (line == 0 && (slots == 0 || w.slot[0].kind != GuessKind::kNeighbour)) continue;
-    add(GuessKind::kLine, line, nullptr, answer.distance);
-    const double* start = line == 0 ? w.slot[0].start : line == 1 ? R::q_home : x0;
-    for (int i = 0; i < R::nq; ++i) w.slot[slots - 1].start[i] = start[i];
-  }
-  return slots;
+typename MemoryWork<Task>::Slot& add(MemoryWork<Task>& w, int& slots, GuessKind kind, int source, const float* bow, double distance) {
+  auto& slot = w.slot[slots++];
+  slot.kind = kind;
+  slot.source = source;
+  slot.bow = bow;
+  slot.distance = distance;
+  slot.deviation = 0;
+  return slot;
 }
 
-// Inverse kinematics from every slot's start, kLanes at a time -> end, reached.
-template <class Task> void find_ends(const ReachTarget& goal, int slots, MemoryWork<Task>& w) {
+// Inverse kinematics from the start of the slots [first, end), kLanes at a time -> end, reached.
+template <class Task> void find_ends(const ReachTarget& goal, int first, int end, MemoryWork<Task>& w) {
   using R = typename Task::Robot;
-  for (int first = 0; first < slots; first += kLanes) {
+  for (; first < end; first += kLanes) {
     Pack q[R::nq];
     for (int l = 0; l < kLanes; ++l) {
-      const auto& slot = w.slot[first + l < slots ? first + l : first];
+      const auto& slot = w.slot[first + l < end ? first + l : first];
       for (int i = 0; i < R::nq; ++i) q[i].l[l] = slot.start[i];
     }
     const Pack error = ik_pose<R, Task::frame>(goal, q, w.rbd);
-    for (int l = 0; l < kLanes && first + l < slots; ++l) {
+    for (int l = 0; l < kLanes && first + l < end; ++l) {
       auto& slot = w.slot[first + l];
       for (int i = 0; i < R::nq; ++i) slot.end[i] = q[i].l[l];
       slot.reached = error.l[l] < kMemoryIkTolerance;
@@ -106,30 +82,84 @@ template <class Task> void find_ends(const ReachTarget& goal, int slots, MemoryW
   }
 }
 
-// Trust and warp of a slot -> guess; false if its end is bent too far.
+template <class Task> double warp_of(const typename MemoryWork<Task>::Slot& slot) {
+  double warp = 0;
+  for (int i = 0; i < Task::Robot::nq; ++i) warp = std::fmax(warp, std::fabs(slot.end[i] - slot.start[i]));
+  return warp;
+}
+
+// The nearest samples whose end can be corrected -> the first slots; returns how many.
 template <class Task>
-bool judge(const MemoryTables& tables, const MemoryOpts& opts, double deviation, typename MemoryWork<Task>::Slot& slot,
-           Guess<Task>& guess) {
+int find_neighbours(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, MemoryWork<Task>& w,
+                    MemoryAnswer<Task>& answer) {
+  constexpr int nq = Task::Robot::nq;
+  if (opts.neighbours == 0) return 0;
+  memory_features<Task>(x0, goal, w.features);
+  answer.status = tab_knn_query(tables.knn, w.features, kMemoryPool, w.index, w.distance2);
+  answer.distance = std::sqrt(w.distance2[0]);
+  int pool = 0, kept = 0;
+  for (int i = 0; i < kMemoryPool && w.index[i] >= 0; ++i) {
+    const float* const value = tab_knn_value(tables.knn, w.index[i]);
+    auto& slot = add(w, pool, GuessKind::kNeighbour, w.index[i], value + nq, std::sqrt(w.distance2[i]));
+    for (int j = 0; j < nq; ++j) slot.start[j] = value[j];
+  }
+  find_ends(goal, 0, pool, w);
+  for (int i = 0; i < pool && kept < opts.neighbours; ++i) {
+    if (w.slot[i].reached && warp_of<Task>(w.slot[i]) <= opts.max_warp) w.slot[kept++] = w.slot[i];
+    else ++answer.refused;
+  }
+  return kept;
+}
+
+// Lines and their regressions -> further slots; returns how many slots there are.
+template <class Task>
+int find_lines(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, int slots,
+               MemoryWork<Task>& w, MemoryAnswer<Task>& answer) {
+  using R = typename Task::Robot;
+  const int first = slots;
+  for (int source = slots > 0 ? 0 : 1; source < opts.lines; ++source) {
+    const double* const start = source == 0 ? w.slot[0].end : source == 1 ? R::q_home : x0;
+    auto& slot = add(w, slots, GuessKind::kLine, source, nullptr, answer.distance);
+    for (int i = 0; i < R::nq; ++i) slot.start[i] = start[i];
+  }
+  const int last = slots;
+  find_ends(goal, first, last, w);
+  for (int i = first; i < last && opts.regression; ++i) {
+    if (!w.slot[i].reached) continue;
+    auto& slot = w.slot[slots++];
+    slot = w.slot[i];
+    slot.kind = GuessKind::kRegression;
+    slot.bow = w.regression[i - first];
+    memory_bow_features<Task>(x0, slot.end, goal, w.bow_features);
+    float variance;
+    tab_gpr_query(tables.gpr, w.bow_features, w.regression[i - first], &variance);
+    slot.deviation = std::sqrt(variance / (tables.gpr->variance + tables.gpr->noise));
+    answer.deviation = std::fmin(answer.deviation, slot.deviation);
+  }
+  return slots;
+}
+
+// Kind, warp and trust of a slot -> guess
+template <class Task>
+void judge(const MemoryTables& tables, typename MemoryWork<Task>::Slot& slot, Guess<Task>& guess) {
   guess.kind = slot.kind;
   guess.source = slot.source;
-  guess.warp = 0;
-  for (int i = 0; i < Task::Robot::nq; ++i) guess.warp = std::fmax(guess.warp, std::fabs(slot.end[i] - slot.start[i]));
-  memory_trust_inputs(std::fmin(slot.distance, kMemoryFar), deviation, guess.warp, slot.kind, slot.trust_inputs);
+  guess.warp = warp_of<Task>(slot);
+  memory_trust_inputs(std::fmin(slot.distance, kMemoryFar), slot.deviation, guess.warp, slot.kind, slot.trust_inputs);
   guess.trust = 0;
   if (slot.reached) tab_logit_eval(tables.trust, slot.trust_inputs, &guess.trust);
-  return slot.kind == GuessKind::kLine || (slot.reached && guess.warp <= opts.max_warp);
 }
 
 // The bow of a slot at the knots -> lane l of w.path
 template <class Task>
 void decode_bow(const MemoryTables& tables, const typename MemoryWork<Task>::Slot& slot, int n, int l, MemoryWork<Task>& w) {
   constexpr int nq = Task::Robot::nq;
-  if (slot.remembered == nullptr) {
+  if (slot.bow == nullptr) {
     for (int k = 0; k <= n; ++k)
       for (int i = 0; i < nq; ++i) w.path[k][i].l[l] = 0;
     return;
   }
-  tab_pca_decode(tables.bow, slot.remembered + nq, w.weights);
+  tab_pca_decode(tables.bow, slot.bow, w.weights);
   tab_rbf_eval(tables.time, w.weights, 0, nq, n + 1, w.basis, w.bow[0]);
   for (int k = 0; k <= n; ++k)
     for (int i = 0; i < nq; ++i) w.path[k][i].l[l] = w.bow[k][i];
@@ -147,20 +177,13 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
   answer.status = kTabOk;
   answer.distance = INFINITY;
   answer.deviation = 1;
-  if (!memory::finite(x0, nq + nv) || !memory::finite(t, n + 1) || !memory::finite(goal.p, 3) || !memory::finite(goal.R, 9)) {
+  if (!memory::usable(x0, nq + nv) || !memory::usable(t, n + 1) || !memory::usable(goal.p, 3) || !memory::usable(goal.R, 9)) {
     answer.status = kTabNotFinite;
     return;
   }
-  const int slots = memory::look_up(tables, opts, goal, x0, w, answer);
-  memory::find_ends(goal, slots, w);
-  for (int s = 0; s < slots; ++s) {
-    // the guess at position n takes slot s, and w.slot[n] keeps it for the next step
-    if (memory::judge(tables, opts, answer.deviation, w.slot[s], answer.guess[answer.n])) {
-      w.slot[answer.n++] = w.slot[s];
-    } else {
-      ++answer.refused;
-    }
-  }
+  const int neighbours = memory::find_neighbours(tables, opts, goal, x0, w, answer);
+  answer.n = memory::find_lines(tables, opts, goal, x0, neighbours, w, answer);
+  for (int i = 0; i < answer.n; ++i) memory::judge<Task>(tables, w.slot[i], answer.guess[i]);
   tab_rbf_basis(tables.time, n + 1, t, w.basis, nullptr);
   const double T = tables.time->head.array[1].data[0];
   for (int first = 0; first < answer.n; first += kLanes) {

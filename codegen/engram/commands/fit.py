@@ -1,0 +1,71 @@
+"""Fit the memory of a robot and task to its solved motions and write the tables the controller links."""
+
+import argparse
+from pathlib import Path
+
+from engram.paths import BUILD, TABLES, relative
+
+EXAMPLES = """examples:
+  engram data panda reach     first: the solved motions, build/data/panda_reach.npz
+  engram fit panda reach      tables/panda_reach/*.c, *.S, *.bin, tables.h, MANIFEST.json
+  engram fit panda reach --out /tmp/tables && engram table diff panda_reach /tmp/tables/panda_reach
+The same data give the same bytes: the process restarts itself with pinned instruction sets and one thread.
+"""
+LIMIT = 2_000_000  # bytes of all files of a memory
+HELD_OUT = 10  # every tenth motion is kept out of the tables, to measure their errors and to calibrate the trust
+TRIALS = 150  # of them, tasks on which guesses are tried
+
+
+def add_parser(subparsers) -> argparse.ArgumentParser:
+    """Arguments of `engram fit`."""
+    parser = subparsers.add_parser("fit", help=__doc__, description=__doc__, epilog=EXAMPLES)
+    parser.add_argument("robot", help="folder of models/ that holds a robot.toml")
+    parser.add_argument("task", help="folder of models/<robot>/ that holds a task.toml")
+    parser.add_argument("--data", type=Path, help="solved motions (default: build/data/<robot>_<task>.npz)")
+    parser.add_argument("--out", type=Path, default=TABLES, help="where the tables' folder is (default: tables/)")
+    parser.add_argument("--trials", type=int, default=TRIALS, help=f"held-out tasks on which guesses are tried (default: {TRIALS})")
+    return parser
+
+
+def run(args: argparse.Namespace) -> int:
+    """Fit, calibrate, write; prints the held-out errors and leaves them in build/figures/fit.json."""
+    from engram.learn.reproducible import restart_pinned
+
+    restart_pinned()
+    from engram.emit import write_tables
+    from engram.inputs import InputError
+    from engram.learn.dataset import load_motions
+    from engram.learn.figures import write_figures
+    from engram.learn.memory import Settings, fit_memory
+    from engram.learn.trials import try_guesses
+    from engram.learn.trust import fit_trust
+    from engram.tasks.spec import load_task
+
+    if args.trials < 10:
+        raise InputError("--trials must be at least 10")
+    spec = load_task(args.robot, args.task)
+    name = f"{args.robot}_{args.task}"
+    source = load_motions(args.data or BUILD / "data" / f"{name}.npz", spec, HELD_OUT)
+    motions = source.motions
+    print(f"fit:    {len(motions.x)} motions, {int(motions.held_out.sum())} of them held out")
+    memory = fit_memory(motions, Settings(), lambda text: print(f"fit:    {text}", flush=True))
+    print("fit:    trust: trying guesses on held-out tasks", flush=True)
+    trust, trust_report = fit_trust(try_guesses(spec, memory, source, args.trials))
+    manifest = write_tables(
+        args.out / name,
+        name,
+        [memory.knn, memory.gpr, memory.bow, memory.time, trust],
+        robot_digest=spec.robot.digest,
+        task_digest=spec.digest,
+        data_digest=source.digest,
+        provenance=f"engram fit {args.robot} {args.task}; {source.made_from}; {len(motions.x)} motions",
+    )
+    size = sum(file["bytes"] for file in manifest["files"].values())
+    report = [*memory.report, *trust_report, ("bytes", float(size), "byte")]
+    for key, value, unit in report:
+        print(f"fit:    {key:<26} {value:.4g} {unit}")
+    write_figures("fit", [(f"fit.{name}.{key}", value, unit, int(motions.held_out.sum())) for key, value, unit in report])
+    print(f"fit:    {relative(args.out / name)}: {len(manifest['files'])} files")
+    if size > LIMIT:
+        raise InputError(f"the tables take {size} bytes, the limit is {LIMIT}: fit fewer motions or coefficients")
+    return 0
