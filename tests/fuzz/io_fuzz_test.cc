@@ -85,7 +85,11 @@ TEST_P(Fuzz, NumbersOfAnyKind) {
   for (int i = 0; i < 300; ++i) {
     engram_msg_state_t state = state_message(plant, ++seq);
     if (below(2)) {
-      for (int n = below(4); n >= 0; --n) (below(2) ? state.q : state.v)[below(7)] = number();
+      for (int n = below(4); n >= 0; --n) {
+        const double value = number();
+        double* const field = below(2) ? state.q : state.v;
+        field[below(7)] = value;
+      }
     }
     if (below(10) == 0) plant.utime += below(3) ? 1000000 : int64_t{1} << 40;
     state.utime = plant.utime;
@@ -107,7 +111,7 @@ TEST_P(Fuzz, NumbersOfAnyKind) {
   EXPECT_EQ(controller.cycle().rung, ENGRAM_RUNG_PLAN);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, Fuzz, testing::Range<uint64_t>(1, 9));
+INSTANTIATE_TEST_SUITE_P(Seeds, Fuzz, testing::Range<uint64_t>(1, 5));
 
 }  // namespace
 }  // namespace engram::test
