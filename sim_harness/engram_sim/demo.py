@@ -48,7 +48,9 @@ def demo(args: argparse.Namespace) -> int:
     header |= {"window_s": spec.success["time"], "tolerance_m": spec.success["position"]}
     drawn = None
     if args.video > 0:
-        drawn = video.render(runs, video.shown_scene(args.robot, args.task), folder / "demo.mp4", spec.frame, args.video, args.jobs)
+        drawn = video.render(
+            runs, video.shown_scene(args.robot, args.task), folder / "demo.mp4", spec.frame, args.video, args.jobs
+        )
     finish(folder, runs, header, drawn, time.monotonic() - start, args.figures)
     return 0 if len(done) == len(modes) and all(code == 0 for code in codes.values()) else 1
 
@@ -95,7 +97,9 @@ def point_latest(folder: Path) -> None:
         os.symlink(folder.name, latest)
 
 
-def finish(folder: Path, runs: list[Run], header: dict[str, Any], drawn: Path | None, seconds: float, figures_folder: Path) -> None:
+def finish(
+    folder: Path, runs: list[Run], header: dict[str, Any], drawn: Path | None, seconds: float, figures_folder: Path
+) -> None:
     """Write summary.json, report.html and the figures; print the summary."""
     curves = suboptimality.curves(runs, header["robot"], header["task"])
     for run in runs:
@@ -158,6 +162,8 @@ def render_again(folder: Path, seconds: float, modes: str | None, jobs: int, out
     if not runs:
         raise InputError(f"--modes {modes}: the run has none of them")
     spec = load_task(header["robot"], header["task"])
-    path = video.render(runs, video.shown_scene(header["robot"], header["task"]), out or folder / "demo.mp4", spec.frame, seconds, jobs)
+    path = video.render(
+        runs, video.shown_scene(header["robot"], header["task"]), out or folder / "demo.mp4", spec.frame, seconds, jobs
+    )
     print(f"video   {relative(path)}" if path else "render: no jump was finished by all modes; nothing to show")
     return 0 if path else 1

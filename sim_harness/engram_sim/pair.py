@@ -45,8 +45,8 @@ def scene(robot: str, task: str) -> Path:
 class Pair:
     """One run: how plant and controller are called and where they write.
 
-    Files of `folder`: run.lcm, results.json, timing.csv, jumps.csv, plant.txt, controller.txt (what they said), pair.json (how they were
-    called).
+    Files of `folder`: run.lcm, results.json, timing.csv, jumps.csv, what they said (plant.txt, controller.txt) and how they were
+    called (pair.json).
     """
 
     folder: Path
@@ -76,7 +76,9 @@ class Pair:
             try:
                 controller = subprocess.Popen(controller_call, stdout=said, stderr=subprocess.STDOUT, stdin=subprocess.DEVNULL)
             except OSError as error:
-                raise InputError(f"{controller_call[0]}: cannot be started ({error.strerror}); give a program to --controller") from None
+                raise InputError(
+                    f"{controller_call[0]}: cannot be started ({error.strerror}); give a program to --controller"
+                ) from None
             plant = subprocess.Popen(plant_call, stdout=subprocess.PIPE, stderr=plant_said, stdin=subprocess.DEVNULL, text=True)
             try:
                 for line in plant.stdout:
@@ -127,7 +129,11 @@ class Progress:
         bar = "#" * round(24 * done / self.total)
         text = f"{self.what}  [{bar:<24}] {done}/{self.total}  {spent:.0f} s, {left:.0f} s left  {note}"
         if self.terminal:
-            print("\r" + text[: shutil.get_terminal_size().columns - 1].ljust(shutil.get_terminal_size().columns - 1), end="", flush=True)
+            print(
+                "\r" + text[: shutil.get_terminal_size().columns - 1].ljust(shutil.get_terminal_size().columns - 1),
+                end="",
+                flush=True,
+            )
         else:
             print(text, flush=True)
         if done == self.total and self.terminal:

@@ -10,7 +10,7 @@ from engram_sim.motion import Motion
 from engram_sim.results import MODES, Run, enumerators, wilson
 
 matplotlib.use("Agg")
-from matplotlib import pyplot as plt  # noqa: E402
+from matplotlib import pyplot as plt
 
 INK, FAINT = "#1f2933", "#d5dbe1"
 COLOUR = {"memory": "#1769aa", "line": "#e08a1e", "shift": "#7a8794", "cold": "#c0392b"}
@@ -62,8 +62,8 @@ def arrivals(runs: list[Run], window: float) -> str:
         jumps = run.finished()
         times = np.sort([jump["arrival_s"] for jump in jumps if jump["success"]])
         share = 100.0 * np.arange(1, len(times) + 1) / max(len(jumps), 1)
-        ax.step(np.concatenate([[0], times, [window]]), np.concatenate([[0], share, share[-1:] if len(share) else [0]]), where="post",
-                color=COLOUR.get(run.mode, INK), linewidth=2, label=run.mode)  # fmt: skip
+        x, y = np.concatenate([[0], times, [window]]), np.concatenate([[0], share, share[-1:] if len(share) else [0]])
+        ax.step(x, y, where="post", color=COLOUR.get(run.mode, INK), linewidth=2, label=run.mode)
     ax.set(xlim=(0, window), ylim=(0, 100), xlabel="time since the jump (s)", ylabel="jumps arrived (%)")
     ax.legend(loc="lower right")
     return svg(fig)
@@ -124,7 +124,9 @@ def candidates(motion: Motion) -> str | None:
         return None
     fig, ax = figure()
     kinds = sorted(ratios)
-    boxes = ax.boxplot([ratios[kind] for kind in kinds], patch_artist=True, showfliers=False, widths=0.55, medianprops={"color": INK})
+    boxes = ax.boxplot(
+        [ratios[kind] for kind in kinds], patch_artist=True, showfliers=False, widths=0.55, medianprops={"color": INK}
+    )
     for box, kind in zip(boxes["boxes"], kinds):
         box.set(facecolor=CANDIDATE_COLOUR[kind % len(CANDIDATE_COLOUR)], alpha=0.75, linewidth=0.8)
     ax.set_xticks(range(1, len(kinds) + 1), [names[kind] if kind < len(names) else str(kind) for kind in kinds])
@@ -167,7 +169,15 @@ def cycle_times(runs: list[Run], period_us: float = 1e4) -> str | None:
     for run in timed:
         total = np.clip(run.timing["total_us"], bins[0], bins[-1])
         weights = np.full(len(total), 100.0 / len(total))
-        ax.hist(1e-3 * total, 1e-3 * bins, weights=weights, histtype="step", linewidth=1.8, color=COLOUR.get(run.mode, INK), label=run.mode)
+        ax.hist(
+            1e-3 * total,
+            1e-3 * bins,
+            weights=weights,
+            histtype="step",
+            linewidth=1.8,
+            color=COLOUR.get(run.mode, INK),
+            label=run.mode,
+        )
     ax.axvline(1e-3 * period_us, color=INK, linewidth=0.8, linestyle=":")
     ax.text(1e-3 * period_us, ax.get_ylim()[1], " period", va="top", fontsize=9)
     ax.set(xscale="log", yscale="log", xlabel="CPU time of a cycle (ms)", ylabel="cycles (%)")
@@ -207,9 +217,8 @@ def torques(motion: Motion) -> str | None:
     fig, ax = figure()
     x = np.arange(shares.shape[1])
     colour = COLOUR.get(motion.run.mode, INK)
-    for values, alpha, label in ((shares.max(axis=0), 0.25, "maximum"), (np.percentile(shares, 99, axis=0), 0.5, "99th percentile"),
-                                 (np.median(shares, axis=0), 1.0, "median")):  # fmt: skip
-        ax.bar(x, values, color=colour, alpha=alpha, width=0.6, label=label)
+    for percentile, alpha, label in ((100, 0.25, "maximum"), (99, 0.5, "99th percentile"), (50, 1.0, "median")):
+        ax.bar(x, np.percentile(shares, percentile, axis=0), color=colour, alpha=alpha, width=0.6, label=label)
     ax.axhline(100, color=INK, linewidth=0.8, linestyle=":")
     ax.set_xticks(x, [str(i + 1) for i in x])
     ax.set(xlabel="joint", ylabel="torque over its limit (%)", ylim=(0, 105))

@@ -59,7 +59,7 @@ def read_steps(path: Path, limit: float | None) -> list[Step]:
 
 
 def controller_call(path: Path, url: str, mode: str | None, controller: Path | None) -> list[str]:
-    """How to call the controller: as pair.json beside the log tells, but at `url` and without side files; `mode` and `controller` win."""
+    """How to call the controller at `url`: as pair.json beside the log tells, without side files; `mode` and `controller` win."""
     try:
         recorded = json.loads((path.parent / "pair.json").read_text(encoding="utf-8"))["controller"]
     except (OSError, ValueError, KeyError):
@@ -122,7 +122,7 @@ class Client:
 
 
 def replay(path: Path, mode: str | None, controller: Path | None, limit: float | None) -> int:
-    """Repeat `path`; 0 if every command and cycle is the same byte for byte, 1 if not. Says which and where. Raises InputError."""
+    """Repeat `path`; 0 if every command and cycle is the same byte for byte, 1 if not. Says what differs. Raises InputError."""
     steps = read_steps(path, limit)
     url = lcm_url(private_port(7))
     call = controller_call(path, url, mode, controller)
@@ -133,7 +133,9 @@ def replay(path: Path, mode: str | None, controller: Path | None, limit: float |
         for n, step in enumerate(steps, 1):
             answer = client.ask(step)
             if answer is None:
-                print(f"\nreplay: no answer to the state of t = {1e-6 * step.utime:.3f} s for {GIVE_UP:.0f} s; see the controller's message")
+                print(
+                    f"\nreplay: no answer to the state of t = {1e-6 * step.utime:.3f} s for {GIVE_UP:.0f} s; see its last words"
+                )
                 return 1
             if step.command is not None and answer != step.command:
                 print(f"\nreplay: {difference(step, answer)}")
@@ -147,7 +149,9 @@ def replay(path: Path, mode: str | None, controller: Path | None, limit: float |
     recorded_cycles = [cycle for step in steps for cycle in step.cycles]
     n = min(len(recorded_cycles), len(client.cycles))
     if sorted(recorded_cycles[:n]) != sorted(client.cycles[:n]) or abs(len(recorded_cycles) - len(client.cycles)) > 1:
-        print(f"replay: the commands are the same, the cycles are not ({len(recorded_cycles)} recorded, {len(client.cycles)} now)")
+        print(
+            f"replay: the commands are the same, the cycles are not ({len(recorded_cycles)} recorded, {len(client.cycles)} now)"
+        )
         return 1
     compared = sum(step.command is not None for step in steps)
     seconds = 1e-6 * (steps[-1].utime - steps[0].utime)

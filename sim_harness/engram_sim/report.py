@@ -1,6 +1,7 @@
 """report.html of a demo: one file without scripts, the video beside it."""
 
 import html
+import os
 import platform
 from pathlib import Path
 from typing import Any
@@ -41,6 +42,17 @@ code { background: #eef1f4; padding: 0.1em 0.35em; border-radius: 4px; font-size
 details { margin-top: 1rem; } summary { cursor: pointer; color: var(--accent); }
 footer { margin-top: 3rem; color: var(--soft); font-size: 0.85rem; }
 """
+
+CLOCK = {"lockstep": "Simulated in lock step", "wall": "Simulated in real time"}
+MODES_TEXT = """<b>memory</b>: remembered motions, straight lines and the shifted plan compete, the lowest merit seeds the solver.
+<b>line</b>: straight lines to an inverse kinematics solution, and the shifted plan. <b>shift</b>: the shifted plan only.
+<b>cold</b>: at a jump stand still, else the shifted plan."""
+VIDEO = """Parts of the run, all modes on the same tasks: the first jumps as they came, then jumps that tell the modes apart.
+Orange: planned path of the hand. Blue: its way so far. Axes: the target."""
+SUBOPTIMALITY = """Distance of the merit at a jump from the best known solution of the same problem, after each iteration of FDDP.
+Median; band: quartiles."""
+HAND_ERROR = """Median distance of hand and target; band: 10th to 90th percentile with memory; dotted: tolerance.
+A jump that has ended keeps its last value."""
 
 
 def number(value: float | None, form: str = ".2f", scale: float = 1.0, unit: str = "") -> str:
@@ -105,7 +117,9 @@ def failures(runs: list[Run], limit: int = 40) -> str:
     if len(rows) == 1:
         return f"<p>No jump of <b>{run.mode}</b> failed.</p>"
     more = f"<p>{len(rows) - 1 - limit} more are in results.json.</p>" if len(rows) - 1 > limit else ""
-    return f"<details><summary>{len(rows) - 1} failed jumps of {run.mode}</summary>{html_table(rows[: limit + 1])}{more}</details>"
+    return (
+        f"<details><summary>{len(rows) - 1} failed jumps of {run.mode}</summary>{html_table(rows[: limit + 1])}{more}</details>"
+    )
 
 
 def ladder(motions: list[Motion]) -> str:
@@ -132,52 +146,63 @@ def cards(summary: dict[str, Any]) -> str:
         shown.append((number(first["arrival_median_s"], ".2f", 1, " s"), "median time to arrive"))
     if "cycle_us" in first:
         shown.append((number(first["cycle_us"]["p50"], ".2f", 1e-3, " ms"), "CPU time of a cycle, median (period 10 ms)"))
-    return '<div class="cards">' + "".join(f'<div class="card"><b>{value}</b><span>{what}</span></div>' for value, what in shown) + "</div>"
+    return (
+        '<div class="cards">'
+        + "".join(f'<div class="card"><b>{value}</b><span>{what}</span></div>' for value, what in shown)
+        + "</div>"
+    )
 
 
-def write(folder: Path, runs: list[Run], motions: list[Motion], summary: dict[str, Any], curves: dict[str, Any], video: Path | None) -> Path:
+def write(
+    folder: Path, runs: list[Run], motions: list[Motion], summary: dict[str, Any], curves: dict[str, Any], video: Path | None
+) -> Path:
     """Write report.html into `folder` and return its path. `curves`: suboptimality over iterations by mode, may be empty."""
     window, tolerance = summary["window_s"], summary["tolerance_m"]
     first = motions[0]
+    # figure, title, caption
     charts = [
-        (plots.success(runs), "Success.", "Hand within tolerance in time and held there, no contact, limits kept."),
-        (plots.arrivals(runs, window), "Arrival.", "How soon the successful jumps have arrived; each curve ends at the success rate."),
-        (plots.suboptimality(curves) if curves else None, "Cost over iterations.", "Distance of the merit at a jump from the best known "
-         "solution of the same problem, after each iteration of FDDP. Median; band: quartiles."),
-        (plots.hand_error(motions, window, tolerance), "Hand error.", "Median distance of hand and target; band: 10th to 90th percentile "
-         "with memory; dotted: tolerance. A jump that has ended keeps its last value."),
-        (plots.candidates(first), "Merit by candidate.", f"What each kind of guess was worth at jumps in mode {first.run.mode}."),
-        (plots.winners(motions), "Winners.", "Which guess seeded the solver at jumps."),
-        (plots.cycle_times(runs), "Cycle time.", "CPU time of a control period, all phases. Dotted: the period."),
-        (plots.phases(first), "Phases.", f"Where the CPU time goes in mode {first.run.mode}."),
-        (plots.torques(first), "Torque.", f"Commanded torque over its limit in mode {first.run.mode}."),
-    ]  # fmt: skip
-    figures = "".join(f"<figure>{chart}<figcaption><b>{title}</b> {text}</figcaption></figure>" for chart, title, text in charts if chart)
+        (plots.success(runs), "Success", "Hand within tolerance in time and held there, no contact, limits kept."),
+        (
+            plots.arrivals(runs, window),
+            "Arrival",
+            "How soon successful jumps arrive; each curve ends at its mode's success rate.",
+        ),
+        (plots.suboptimality(curves) if curves else None, "Cost over iterations", SUBOPTIMALITY),
+        (plots.hand_error(motions, window, tolerance), "Hand error", HAND_ERROR),
+        (plots.candidates(first), "Merit by candidate", f"What each kind of guess was worth at jumps in mode {first.run.mode}."),
+        (plots.winners(motions), "Winners", "Which guess seeded the solver at jumps."),
+        (plots.cycle_times(runs), "Cycle time", "CPU time of a control period, all phases. Dotted: the period."),
+        (plots.phases(first), "Phases", f"Where the CPU time goes in mode {first.run.mode}."),
+        (plots.torques(first), "Torque", f"Commanded torque over its limit in mode {first.run.mode}."),
+    ]
+    figures = "".join(
+        f"<figure>{chart}<figcaption><b>{title}.</b> {text}</figcaption></figure>" for chart, title, text in charts if chart
+    )
     robot, task = html.escape(summary["robot"]), html.escape(summary["task"])
     shown = ""
     if video:
-        shown = (f'<video src="{html.escape(video.name)}" controls loop muted preload="metadata"></video>'
-                 "<p>Parts of the run, all modes on the same tasks: the first jumps as they came, then jumps that tell the modes apart. "
-                 "Orange: planned path of the hand. Blue: its way so far. Axes: the target.</p>")  # fmt: skip
-    moves = [f"{mode} {1e3 * row['move_error_mean_m']:.1f} mm" for mode, row in summary["modes"].items() if "move_error_mean_m" in row]
+        shown = f'<video src="{html.escape(video.name)}" controls loop muted preload="metadata"></video><p>{VIDEO}</p>'
+    moves = [
+        f"{mode} {1e3 * row['move_error_mean_m']:.1f} mm" for mode, row in summary["modes"].items() if "move_error_mean_m" in row
+    ]
     moving = f"<p>While the target moves, the hand is on average this far from it: {', '.join(moves)}.</p>" if moves else ""
     page = f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Engram: {robot} {task}</title><style>{CSS}</style></head><body><main>
 <h1>Engram: {robot} {task}</h1>
-<p class="lead">{summary["jumps"]} jumps of the target, seed {summary["seed"]}, the same series for every mode; simulated in lock step at 1 kHz,
-planned at 100 Hz.</p>
+<p class="lead">{summary["jumps"]} jumps of the target, seed {summary["seed"]}, the same series for every mode.
+{CLOCK[summary["clock"]]} at 1 kHz, planned at 100 Hz.</p>
 {shown}{cards(summary)}
 <h2>Memory on, memory off</h2>
 {html_table(table(summary), swatches=True)}
-<p><b>memory</b>: remembered motions, straight lines and the shifted plan compete, the lowest merit seeds the solver. <b>line</b>: straight
-lines to an inverse kinematics solution and the shifted plan. <b>shift</b>: the shifted plan only. <b>cold</b>: at a jump stand still.</p>
+<p>{MODES_TEXT}</p>
 {moving}{failures(runs)}
 <h2>Figures</h2><div class="grid">{figures}</div>
 <h2>Fall-back ladder</h2><p>Share of cycles by what drove the torque.</p>{ladder(motions)}
-<h2>Again</h2><p><code>engram demo --robot {robot} --task {task} --seed {summary["seed"]} --jumps {summary["jumps"]}</code> &nbsp;
-<code>engram replay {html.escape(relative(runs[0].log))}</code></p>
-<footer>{html.escape(platform.machine())}, {html.escape(platform.system())}; the whole demo took {summary["wall_s"]:.0f} s.</footer>
+<h2>Again</h2>
+<p><code>engram demo --robot {robot} --task {task} --seed {summary["seed"]} --jumps {summary["jumps"]}</code></p>
+<p><code>engram replay {html.escape(relative(runs[0].log))}</code></p>
+<footer>{platform.system()}, {platform.machine()}, {os.cpu_count()} CPUs; the whole demo took {summary["wall_s"]:.0f} s.</footer>
 </main></body></html>
 """
     path = folder / "report.html"

@@ -1,4 +1,4 @@
-"""Writing task series (the format is told in sim_harness/sim_series.h): jumps between random reachable poses, and moving targets."""
+"""Writing task series (format: sim_harness/sim_series.h): jumps between random reachable poses, and moving targets."""
 
 from pathlib import Path
 
@@ -18,8 +18,8 @@ MAX_STEP = 0.1  # rad, largest change of a joint between two poses of a moving t
 def write_reach(path: Path, robot: str, task: str, seed: int, jumps: int, per_episode: int = 30, move_every: int = 10) -> int:
     """Write a series of `jumps` jumps; the same seed gives the same bytes.
 
-    Each episode starts in a random posture; after every `move_every`-th jump the target goes round a circle. Returns the number of
-    moving parts.
+    Each episode starts in a random posture; after every `move_every`-th jump the target goes round a circle. Returns the number
+    of moving parts.
     """
     draw = sampler(robot, task)
     spec, rng = draw.spec, np.random.default_rng([HELD_OUT, seed])
@@ -54,8 +54,8 @@ def circle(
 ) -> list[tuple[np.ndarray, np.ndarray]]:
     """Poses of a target that leaves p_WT, goes round a circle and comes back, at rest at both ends.
 
-    The circle lies in a random plane; its radius is the first of MOVE_RADII at which the posture `q` can follow without a leap and
-    with the clearance asked of targets. Empty if none is.
+    The circle lies in a random plane; its radius is the first of MOVE_RADII at which the posture `q` can follow without a leap
+    and with the clearance asked of targets. Empty if none is.
     """
     e1 = rng.standard_normal(3)
     e2 = np.cross(e1 / np.linalg.norm(e1), rng.standard_normal(3))

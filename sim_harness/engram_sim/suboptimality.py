@@ -1,7 +1,7 @@
 """How far the guess and the first iterations at a jump are from the best known solution of the same problem.
 
-The controller writes, for each jump, the problem (state, task vector) and the merit of its guess and after each iteration. J* is the lowest
-cost among what the controller itself reached there and what converges from a cold start, from straight lines and from detours.
+The controller writes, for each jump, the problem (state, task vector) and the merit of its guess and after each iteration. J* is
+the lowest cost among what the controller itself reached there and what converges from a cold start, straight lines and detours.
 """
 
 from concurrent.futures import ProcessPoolExecutor
@@ -115,7 +115,7 @@ def curves(runs: list[Run], robot: str, task: str, jobs: int = 2) -> dict[str, n
 
 
 def suboptimality(merits: np.ndarray, best: float) -> np.ndarray:
-    """(ITERATIONS + 1) values (merit - J*) / J*, J* the lower of `best` and of the merits themselves; the last one is repeated."""
+    """(ITERATIONS + 1) values (merit - J*) / J*, J* the lowest of `best` and the merits themselves; the last one is repeated."""
     lowest = min(best, merits.min())
     padded = np.concatenate([merits, np.full(ITERATIONS + 1, merits[-1])])[: ITERATIONS + 1]
     return (padded - lowest) / lowest

@@ -19,8 +19,8 @@ TITLES = {"memory": "memory", "line": "straight line", "shift": "shifted plan", 
 def choose(runs: list[Run], seconds: float) -> list[tuple[str, int, bool]]:
     """Title, jump number and whether its moving part is meant, for about `seconds` of video.
 
-    The first OPENING jumps as they come, one moving target, then the jumps that tell the modes apart: the first mode succeeds and most
-    others fail.
+    The first OPENING jumps as they come, one moving target, then the jumps that tell the modes apart: the first mode succeeds and
+    most others fail.
     """
     jumps = [{jump["jump"]: jump for jump in run.finished()} for run in runs]
     common = sorted(set.intersection(*(set(mode) for mode in jumps)))
@@ -71,9 +71,9 @@ def shown_scene(robot: str, task: str) -> Path:
 
 
 def render(runs: list[Run], scene: Path, out: Path, hand: str, seconds: float = 30.0, jobs: int = 2) -> Path | None:
-    """Draw about `seconds` of the runs into `out` (mp4) with `jobs` processes; returns its path, or None if nothing could be shown.
+    """Draw about `seconds` of the runs into `out` (mp4) with `jobs` processes.
 
-    Raises InputError with the renderer's last message if it fails.
+    Returns its path, or None if nothing could be shown. Raises InputError with the renderer's last message if it fails.
     """
     chosen = choose(runs, seconds)
     if not chosen:

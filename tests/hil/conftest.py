@@ -59,12 +59,22 @@ class Arena:
     def plant_call(self, *options: str | Path) -> list[str]:
         """The test series, unless `options` name another one or none: --series ''."""
         base = ["--scene", self.scene, "--series", self.series(), "--lcm-url", self.url, "--give-up", "5", "--resend-ms", "50"]
-        call = [program("engram-plant"), *base, "--log", self.folder / "run.lcm", "--results", self.folder / "results.json", *options]
+        call = [
+            program("engram-plant"),
+            *base,
+            "--log",
+            self.folder / "run.lcm",
+            "--results",
+            self.folder / "results.json",
+            *options,
+        ]
         return [str(word) for word in call]
 
     def plant(self, *options: str | Path, **keywords) -> subprocess.CompletedProcess:
         """Run the plant to its end (at most 60 s)."""
-        return subprocess.run(self.plant_call(*options), capture_output=True, text=True, timeout=60, stdin=subprocess.DEVNULL, **keywords)
+        return subprocess.run(
+            self.plant_call(*options), capture_output=True, text=True, timeout=60, stdin=subprocess.DEVNULL, **keywords
+        )
 
     def results(self) -> dict:
         return json.loads((self.folder / "results.json").read_text())

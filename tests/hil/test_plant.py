@@ -108,7 +108,16 @@ def test_garbage_on_every_channel_changes_nothing(arena: Arena) -> None:
     good = next(data for _, channel, data in eventlog.events(arena.folder / "clean.lcm") if channel == "ENGRAM_COMMAND")
     never_sent = np.frombuffer(good, command).copy()
     never_sent["seq"], never_sent["utime"] = 2**40, 2**50
-    garbage = [b"", b"x", good[:-1], good + b"x", b"\0" * command.itemsize, good[8:] + good[:8], never_sent.tobytes(), b"\xff" * cycle.itemsize]
+    garbage = [
+        b"",
+        b"x",
+        good[:-1],
+        good + b"x",
+        b"\0" * command.itemsize,
+        good[8:] + good[:8],
+        never_sent.tobytes(),
+        b"\xff" * cycle.itemsize,
+    ]
 
     def shout() -> None:
         net = lcm.LCM(arena.url)
@@ -130,7 +139,9 @@ def test_garbage_on_every_channel_changes_nothing(arena: Arena) -> None:
 
 
 @pytest.mark.parametrize(
-    ("kind", "counter", "word"), [("1", "not_finite", "not finite"), ("2", "foreign_robot", "another robot")], ids=["nan", "foreign"]
+    ("kind", "counter", "word"),
+    [("1", "not_finite", "not finite"), ("2", "foreign_robot", "another robot")],
+    ids=["nan", "foreign"],
 )
 def test_wrong_commands_are_refused_and_said_once(arena: Arena, kind: str, counter: str, word: str) -> None:
     arena.controller("--misbehave", kind)
@@ -239,7 +250,18 @@ def test_wrong_options_are_told(arena: Arena, options: list[str], code: int, wor
 
 
 def test_faults_follow_their_seed(arena: Arena) -> None:
-    faults = ["--noise-q", "0.0005", "--noise-v", "0.005", "--latency", "2", "--random-push-period", "0.3", "--random-push-force", "20"]
+    faults = [
+        "--noise-q",
+        "0.0005",
+        "--noise-v",
+        "0.005",
+        "--latency",
+        "2",
+        "--random-push-period",
+        "0.3",
+        "--random-push-force",
+        "20",
+    ]
     a = run_log(arena, "a.lcm", *faults, "--seed", "5")
     b = run_log(arena, "b.lcm", *faults, "--seed", "5")
     c = run_log(arena, "c.lcm", *faults, "--seed", "6")
@@ -258,7 +280,8 @@ def test_push_pushes(arena: Arena) -> None:
     run_log(arena, "calm.lcm", "--duration", "0.5")
     run_log(arena, "pushed.lcm", "--duration", "0.5", "--push", "0.2,link7,0,40,0,0.1")
     calm, pushed = (
-        eventlog.read(arena.folder / name, ["ENGRAM_STATE"])["ENGRAM_STATE"]["v"].astype(float) for name in ("calm.lcm", "pushed.lcm")
+        eventlog.read(arena.folder / name, ["ENGRAM_STATE"])["ENGRAM_STATE"]["v"].astype(float)
+        for name in ("calm.lcm", "pushed.lcm")
     )
     assert np.array_equal(calm[:200], pushed[:200])
     assert np.abs(calm[300] - pushed[300]).max() > 0.1
@@ -293,7 +316,17 @@ def test_help_names_every_option(arena: Arena) -> None:
 
 def test_results_are_json_even_without_a_series(arena: Arena) -> None:
     arena.controller()
-    call = [program("engram-plant"), "--scene", ARM, "--lcm-url", arena.url, "--duration", "0.1", "--results", arena.folder / "r.json"]
+    call = [
+        program("engram-plant"),
+        "--scene",
+        ARM,
+        "--lcm-url",
+        arena.url,
+        "--duration",
+        "0.1",
+        "--results",
+        arena.folder / "r.json",
+    ]
     assert subprocess.run(call, timeout=30).returncode == 0
     results = json.loads((arena.folder / "r.json").read_text())
     assert results["jumps"] == [] and results["steps"] > 90

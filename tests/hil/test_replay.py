@@ -18,7 +18,17 @@ def log(arena: Arena) -> Path:
     """A short run, and beside it how its controller was called."""
     arena.controller()
     assert arena.plant("--duration", "0.6").returncode == 0
-    call = [str(program("engram-standin")), "--lcm-url", "elsewhere", "--scene", str(ARM), "--clock", "lockstep", "--memory", "memory"]
+    call = [
+        str(program("engram-standin")),
+        "--lcm-url",
+        "elsewhere",
+        "--scene",
+        str(ARM),
+        "--clock",
+        "lockstep",
+        "--memory",
+        "memory",
+    ]
     (arena.folder / "pair.json").write_text(json.dumps({"controller": [*call, "--jumps", "nowhere.csv"]}))
     return arena.folder / "run.lcm"
 

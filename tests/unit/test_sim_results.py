@@ -70,7 +70,15 @@ def plant_results(jumps: list[dict]) -> str:
 
 
 def jump(success: bool, reason: str = "ok", arrival: float = 1.0) -> dict:
-    return {"jump": 1, "t_start_s": 0.0, "t_end_s": 2.0, "success": success, "reason": reason, "arrival_s": arrival, "statuses": {}}
+    return {
+        "jump": 1,
+        "t_start_s": 0.0,
+        "t_end_s": 2.0,
+        "success": success,
+        "reason": reason,
+        "arrival_s": arrival,
+        "statuses": {},
+    }
 
 
 def test_summary_counts_and_times(tmp_path: Path) -> None:

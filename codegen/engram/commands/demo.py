@@ -19,13 +19,21 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--task", default="reach", help="task to run (default: reach)")
     parser.add_argument("--seed", type=int, default=1, help="of the task series; none repeats the training data (default: 1)")
     parser.add_argument("--jumps", type=int, default=300, help="jumps of the target (default: 300)")
-    parser.add_argument("--modes", default="memory,line,shift,cold", help="what may seed the solver (default: memory,line,shift,cold)")
+    parser.add_argument(
+        "--modes", default="memory,line,shift,cold", help="what may seed the solver (default: memory,line,shift,cold)"
+    )
     parser.add_argument("--jobs", type=int, default=2, help="modes run side by side (default: 2)")
-    parser.add_argument("--clock", choices=["lockstep", "wall"], default="lockstep", help="reproducible, or real time (default: lockstep)")
+    parser.add_argument(
+        "--clock", choices=["lockstep", "wall"], default="lockstep", help="reproducible, or real time (default: lockstep)"
+    )
     parser.add_argument("--out", type=Path, help="folder to write (default: runs/<time>/)")
-    parser.add_argument("--log-full", type=float, default=20.0, help="s of the log with every state, for `engram replay` (default: 20)")
+    parser.add_argument(
+        "--log-full", type=float, default=20.0, help="s of the log with every state, for `engram replay` (default: 20)"
+    )
     parser.add_argument("--video", type=float, default=30.0, help="s of video; 0: none (default: 30)")
-    parser.add_argument("--plant-option", action="append", default=[], metavar="OPTION=VALUE", help="for engram-plant, e.g. noise-v=0.01")
+    parser.add_argument(
+        "--plant-option", action="append", default=[], metavar="OPTION=VALUE", help="for engram-plant, e.g. noise-v=0.01"
+    )
     parser.add_argument("--figures", type=Path, default=BUILD / "figures", help="where demo.json goes (default: build/figures/)")
     parser.add_argument("--controller", type=Path, help="program to run (default: engram-controller of the build)")
     return parser

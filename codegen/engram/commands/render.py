@@ -14,7 +14,7 @@ For a time range of any log: build/bin/engram-render --help
 def add_parser(subparsers) -> argparse.ArgumentParser:
     """Arguments of `engram render`."""
     parser = subparsers.add_parser("render", help=__doc__, description=__doc__, epilog=EPILOG)
-    parser.add_argument("run", type=Path, help="folder of a demo")
+    parser.add_argument("folder", type=Path, help="folder of a demo")
     parser.add_argument("--seconds", type=float, default=30.0, help="length of the video (default: 30)")
     parser.add_argument("--modes", help="modes to show side by side (default: all of the run)")
     parser.add_argument("--jobs", type=int, default=2, help="processes (default: 2)")
@@ -26,4 +26,4 @@ def run(args: argparse.Namespace) -> int:
     """Draw the video."""
     from engram_sim.demo import render_again
 
-    return render_again(args.run, args.seconds, args.modes, args.jobs, args.out)
+    return render_again(args.folder, args.seconds, args.modes, args.jobs, args.out)

@@ -12,9 +12,15 @@ EXAMPLES = """examples:
 def add_parser(subparsers) -> argparse.ArgumentParser:
     """Arguments of `engram replay`."""
     parser = subparsers.add_parser("replay", help=__doc__, description=__doc__, epilog=EXAMPLES)
-    parser.add_argument("log", type=Path, help="LCM log of engram-plant in lock step; repeated up to the first state that is missing")
-    parser.add_argument("--memory", help="mode of the controller (default: as in the run, see pair.json beside the log; else memory)")
-    parser.add_argument("--controller", type=Path, help="program to run (default: as in the run; else engram-controller of the build)")
+    parser.add_argument(
+        "log", type=Path, help="LCM log of engram-plant in lock step; repeated up to the first state that is missing"
+    )
+    parser.add_argument(
+        "--memory", help="mode of the controller (default: as in the run, see pair.json beside the log; else memory)"
+    )
+    parser.add_argument(
+        "--controller", type=Path, help="program to run (default: as in the run; else engram-controller of the build)"
+    )
     parser.add_argument("--limit", type=float, help="s of plant time to repeat (default: all)")
     return parser
 

@@ -9,7 +9,7 @@ from engram.paths import BUILD
 def add_parser(subparsers) -> argparse.ArgumentParser:
     """Arguments of `engram report`."""
     parser = subparsers.add_parser("report", help=__doc__, description=__doc__, epilog="example:\n  engram report runs/latest")
-    parser.add_argument("run", type=Path, help="folder of a demo")
+    parser.add_argument("folder", type=Path, help="folder of a demo")
     parser.add_argument("--figures", type=Path, default=BUILD / "figures", help="where demo.json goes (default: build/figures/)")
     return parser
 
@@ -18,4 +18,4 @@ def run(args: argparse.Namespace) -> int:
     """Write the report."""
     from engram_sim.demo import report_again
 
-    return report_again(args.run, args.figures)
+    return report_again(args.folder, args.figures)
