@@ -71,7 +71,10 @@ struct FddpStats {
 template <class P, int N> struct Horizon {
   int n = 0;                                  // knots with a control, 0 <= n <= N
   double x0[P::nx];                           // measured or predicted state
+  unsigned phase[N + 1] = {};                  // what each knot is, for a problem with phases
   typename P::template Knot<double> knot[N + 1];
+
+  unsigned phase_of(int k) const { return k == n ? kTerminalPhase : phase[k]; }
 };
 
 template <class P, int N> struct FddpSolution {
@@ -85,7 +88,7 @@ template <class P, int N> struct FddpSolution {
 // Scratch of one solve; nothing in it needs to survive but between fddp_prepare and fddp_feedback.
 template <class P, int N> struct FddpWork {
   using L = typename P::Layout;
-  using Model = KnotModel<L, P::kFreeBase, double>;
+  using Model = typename P::LqModel;
   // written by fddp_linearize
   Model model[N + 1];
   alignas(64) double f[N + 1][L::nxp];    // gaps: f_0 = x0 (-) x_0, f_{k+1} = f_k(x_k, u_k) (-) x_{k+1}   (ndx)
@@ -104,7 +107,7 @@ template <class P, int N> struct FddpWork {
   bool feasible, was_feasible;
   double reg;
   // scratch
-  KnotModel<L, P::kFreeBase, Pack> lanes;
+  typename P::Lanes lanes;
   alignas(64) double Q[L::nzp][L::nzp], Qz[L::nzp];
   alignas(64) double Vxx[L::nxp][L::nxp], Vx[L::nxp];
   alignas(64) double Vvq[P::nv][padded(P::nv)], Vvv[P::nv][padded(P::nv)], Vqq[P::nv][padded(P::nv)];

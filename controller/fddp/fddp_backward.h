@@ -11,6 +11,7 @@
 #define CONTROLLER_FDDP_FDDP_BACKWARD_H_
 
 #include "controller/fddp/fddp_box.h"
+#include "controller/fddp/fddp_force_costs.h"
 #include "controller/fddp/fddp_kernels.h"
 
 #include <cmath>
@@ -101,10 +102,11 @@ template <class P, int N> void action_value(const typename FddpWork<P, N>::Model
     }
   std::memset(w.B, 0, sizeof(w.B));
   kernel::product<nv, nvp, nv>(&m.D[0][0], nzp, &w.Vvq[0][0], nvp, &w.B[0][0], nvp);  // B = Dq' (1/2 Vvv~ Dq + Vvq~)
+  copy_hessian(m, nzp, w.Q);
   for (int i = 0; i < nv; ++i)
-    for (int j = 0; j <= i; ++j) w.Q[i][j] = m.Lzz[i][j] + w.Vqq[i][j] + (w.B[i][j] + w.B[j][i]);
-  for (int i = ov; i < nzp; ++i) std::memcpy(w.Q[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+    for (int j = 0; j <= i; ++j) w.Q[i][j] += w.Vqq[i][j] + (w.B[i][j] + w.B[j][i]);
   kernel::product_lower<nzp, nv, kernel::Sign::kPlus, ov>(&m.D[0][0], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
+  if constexpr (P::kPhases) add_force_hessian<P, N>(m, w);
   std::memcpy(w.Qz, m.Lz, sizeof(w.Qz));
   for (int i = 0; i < nv; ++i) w.Qz[i] += w.Vx[i];
   kernel::product_vector<nzp, nv>(&m.D[0][0], nzp, w.Vx + ov, w.Qz);
@@ -181,10 +183,8 @@ template <class P, int N>
 bool fddp_backward(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s) {
   using L = typename P::Layout;
   w.dg = w.dq = 0.0;
-  for (int i = 0; i < L::nxp; ++i) {
-    std::memcpy(w.Vxx[i], w.model[h.n].Lzz[i], padded(i + 1) * sizeof(double));
-    w.Vx[i] = w.model[h.n].Lz[i];
-  }
+  copy_hessian(w.model[h.n], L::nxp, w.Vxx);
+  std::memcpy(w.Vx, w.model[h.n].Lz, sizeof(w.Vx));
   close_value(w);
   for (int k = h.n - 1; k >= 0; --k) {
     close_gap(k + 1, w);

@@ -1,4 +1,4 @@
-// Step 1 of an iteration: the linear-quadratic model of every knot at (xs, us), kLanes knots at a time, and the gaps.
+// Step 1 of an iteration: the linear-quadratic model of every knot at (xs, us), kLanes knots of one phase at a time, and the gaps.
 #ifndef CONTROLLER_FDDP_FDDP_LINEARIZE_H_
 #define CONTROLLER_FDDP_FDDP_LINEARIZE_H_
 
@@ -8,13 +8,42 @@
 
 namespace engram {
 
-// Lanes of knots first, first + 1, ...; beyond last the last knot is repeated.
+// Knots side by side: `count` of them, then the last one repeated.
 struct KnotLanes {
+  int count = 0;
   int index[kLanes];
-  KnotLanes(int first, int last) {
-    for (int i = 0; i < kLanes; ++i) index[i] = first + i < last ? first + i : last;
+
+  void push(int k) { index[count++] = k; }
+  void fill() {
+    for (int i = count; i < kLanes; ++i) index[i] = index[count - 1];
+  }
+  // The knots `by` later, none beyond last.
+  KnotLanes shifted(int by, int last) const {
+    KnotLanes to = *this;
+    for (int& k : to.index) k = k + by < last ? k + by : last;
+    return to;
   }
 };
+
+// Calls f(lanes) for all knots 0 .. h.n, those of one phase together (in order of their first knots), so that lanes run alike.
+template <class P, int N, class F> void for_lanes_of_knots(const Horizon<P, N>& h, F f) {
+  bool placed[N + 1] = {};
+  for (int first = 0; first <= h.n; ++first) {
+    if (placed[first]) continue;
+    KnotLanes lanes;
+    for (int k = first; k <= h.n; ++k) {
+      if (P::kPhases && h.phase_of(k) != h.phase_of(first)) continue;
+      placed[k] = true;
+      lanes.push(k);
+      if (lanes.count < kLanes) continue;
+      f(lanes);
+      lanes.count = 0;
+    }
+    if (lanes.count == 0) continue;
+    lanes.fill();
+    f(lanes);
+  }
+}
 
 // n doubles of each of kLanes records -> n packs.
 template <class Record> inline void gather(const Record* records, const KnotLanes& knots, int n, Pack* out) {
@@ -58,26 +87,31 @@ template <class P, int N> bool fddp_linearize(const Horizon<P, N>& h, const Fddp
   Pack x[P::nx], u[P::nu], x_next[P::nx], x_there[P::nx], cost, f[L::nxp];
 
   w.cost = 0.0;
-  for (int k = 0; k <= h.n; k += kLanes) {
-    const KnotLanes here(k, h.n), there(k + 1, h.n);
+  for_lanes_of_knots(h, [&](const KnotLanes& here) {
     gather(h.knot, here, knot_size, reinterpret_cast<Pack*>(&knot));
     gather(s.x, here, P::nx, x);
-    gather(s.u, KnotLanes(k, h.n > 0 ? h.n - 1 : 0), P::nu, u);
-    if (k + kLanes > h.n)  // the terminal knot has no control
-      for (int i = 0; i < P::nu; ++i)
-        for (int j = 0; j < kLanes; ++j)
-          if (here.index[j] == h.n) u[i].l[j] = 0.0;
-    P::linearize(knot, x, u, x_next, cost, w.lanes);
-    fddp_scatter_models(w, here);
-    for (int i = 0; i < kLanes && k + i <= h.n; ++i) w.cost += cost.l[i];
+    gather(s.u, here.shifted(0, h.n > 0 ? h.n - 1 : 0), P::nu, u);
+    for (int j = 0; j < kLanes; ++j)  // the terminal knot has no control
+      if (here.index[j] == h.n)
+        for (int i = 0; i < P::nu; ++i) u[i].l[j] = 0.0;
+    if constexpr (P::kPhases) {
+      const unsigned phase = h.phase_of(here.index[0]);
+      P::linearize(phase, knot, x, u, x_next, cost, w.lanes);
+      for (int i = 0; i < here.count; ++i) P::finish(phase, h.knot[here.index[i]].dt, w.lanes, i, w.model[here.index[i]]);
+    } else {
+      P::linearize(knot, x, u, x_next, cost, w.lanes);
+      fddp_scatter_models(w, here);
+    }
+    for (int i = 0; i < here.count; ++i) w.cost += cost.l[i];
 
     if (!w.feasible) {  // f_{k+1} = f(x_k, u_k) (-) x_{k+1}
-      gather(s.x, there, P::nx, x_there);
+      gather(s.x, here.shifted(1, h.n), P::nx, x_there);
       P::difference(x_there, x_next, f);
-      for (int i = 0; i < kLanes && k + i < h.n; ++i)
-        for (int e = 0; e < L::nxp; ++e) w.f[k + i + 1][e] = f[e].l[i];
+      for (int i = 0; i < here.count; ++i)
+        if (here.index[i] < h.n)
+          for (int e = 0; e < L::nxp; ++e) w.f[here.index[i] + 1][e] = f[e].l[i];
     }
-  }
+  });
   if (!w.feasible) P::difference(s.x[0], h.x0, w.f[0]);
   else
     for (int k = 0; k <= h.n; ++k)

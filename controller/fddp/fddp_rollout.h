@@ -41,7 +41,8 @@ Pack fddp_rollout(const Horizon<P, N>& h, const FddpOpts& opts, const FddpSoluti
         w.u_try[k][i] = Pack(s.u[k][i]) - alpha * Pack(w.k[k][i]) - Kdx;
         if (opts.box) w.u_try[k][i] = min(max(w.u_try[k][i], Pack(P::u_lo(i))), Pack(P::u_hi(i)));
       }
-      P::calc(knot, w.x_try[k], w.u_try[k], x_next, cost_k);
+      if constexpr (P::kPhases) P::calc(h.phase[k], knot, w.x_try[k], w.u_try[k], x_next, cost_k);
+      else P::calc(knot, w.x_try[k], w.u_try[k], x_next, cost_k);
     } else {
       P::calc_terminal(knot, w.x_try[k], cost_k);
     }

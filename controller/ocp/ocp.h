@@ -1,4 +1,4 @@
-// A knot of the optimal control problem: a robot R, driven by torques, and a sum of cost terms.
+// A knot of the optimal control problem: a robot R, driven by its controls (ocp_actuation.h), and a sum of cost terms.
 //
 //   a  = forward dynamics (q, v, u)
 //   v' = v + dt a                      semi-implicit Euler on the manifold
@@ -10,6 +10,7 @@
 #ifndef CONTROLLER_OCP_OCP_H_
 #define CONTROLLER_OCP_OCP_H_
 
+#include "controller/ocp/ocp_actuation.h"
 #include "controller/ocp/ocp_view.h"
 #include "controller/rbd/rbd_derivatives.h"
 #include "controller/rbd/rbd_forward.h"
@@ -25,8 +26,10 @@ template <class R_, class... Terms> struct Ocp {
   static constexpr bool kFreeBase = has_free_base<R>();
   static constexpr bool kNeedsGravity = (Terms::kNeedsGravity || ...);
   static constexpr int nq = R::nq, nv = R::nv, nx = nq + nv, ndx = 2 * nv, nu = R::nu, nz = ndx + nu;
-  static constexpr int first_actuated = nv - nu;
   template <class S> using Model = ModelOf<R, S>;
+  using LqModel = Model<double>;
+  using Lanes = Model<Pack>;
+  static constexpr bool kPhases = false;  // all knots are of one kind
   template <class S> struct Knot : Terms::template Param<S>... {
     S dt;  // time step [s]; 0 at the terminal knot
   };
@@ -85,7 +88,13 @@ template <class R_, class... Terms> struct Ocp {
         M.D[i][Layout::ov + j] = knot.dt * da_dv(i, j);
       }
       M.D[i][Layout::ov + i] += 1.0;
-      for (int j = 0; j < nu; ++j) M.D[i][Layout::ou + j] = knot.dt * Minv(i, first_actuated + j);
+      for (int j = 0; j < nu; ++j) {
+        if constexpr (Actuation<R>::kDrivesDofs) {
+          M.D[i][Layout::ou + j] = knot.dt * Minv(i, Actuation<R>::dof(j));
+        } else {
+          for (int k = 0; k < nv; ++k) M.D[i][Layout::ou + j] += knot.dt * Minv(i, k) * S(Actuation<R>::entry(k, j));
+        }
+      }
     }
     step(knot.dt, x, a, x_next);
     if constexpr (kFreeBase) {
@@ -111,7 +120,7 @@ template <class R_, class... Terms> struct Ocp {
  private:
   template <class S> static void forward(const S* x, const S* u, RbdData<R, S>& d, S* a) {
     S tau[nv];
-    for (int i = 0; i < nv; ++i) tau[i] = i < first_actuated ? S(0.0) : u[i - first_actuated];
+    Actuation<R>::apply(u, tau);
     rbd_forward_dynamics<R>(x, x + nq, tau, d, a);
   }
 

@@ -12,6 +12,7 @@
 #include "controller/rbd/rbd_types.h"
 
 #include <cstddef>
+#include <cstring>
 
 namespace engram {
 
@@ -21,6 +22,9 @@ inline constexpr int kVector = 8;  // doubles in a register of the dense kernels
 inline constexpr int kVector = 4;
 #endif
 constexpr int padded(int n) { return (n + kVector - 1) / kVector * kVector; }
+
+// The phase of the terminal knot, in problems with phases.
+inline constexpr unsigned kTerminalPhase = 1u << 30;
 
 // Sizes and offsets of z = (q, v, u) for nv velocities and nu controls.
 template <int nv_, int nu_> struct KnotLayout {
@@ -44,6 +48,12 @@ template <class Layout, bool free_base, class S> struct KnotModel : BaseBlock<fr
   alignas(64) S Lz[Layout::nzp];                // d l / d z                                   (nz)
   alignas(64) S Lzz[Layout::nzp][Layout::nzp];  // Gauss-Newton Hessian, lower triangle        (nz x nz)
 };
+
+// The first n rows of a knot's Hessian, lower triangle up to the padding, into rows of ld.
+template <class Layout, bool free_base, int ld>
+inline void copy_hessian(const KnotModel<Layout, free_base, double>& m, int n, double (*to)[ld]) {
+  for (int i = 0; i < n; ++i) std::memcpy(to[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+}
 
 // Where coordinate i of dz = (dq, dv, du) stands in a padded vector.
 template <class Layout> constexpr int padded_index(int i) {

@@ -1,0 +1,191 @@
+// The linear-quadratic model of a knot with contacts, and its last, dense step, a knot at a time.
+//
+//   dv' = D dz,  dq' = E dq + dt G dv'                 as in ocp_knot_model.h
+//   dlambda = F dz                                     contact forces, world axes at each contact
+//   l ~ l0 + Lz' dz + 1/2 dz' (Hqq + diag(h) + F' H F) dz
+//
+// Costs touch few coordinates: those of the state couple q with q, those of forces come through F. The full Hessian is never stored.
+#ifndef CONTROLLER_OCP_OCP_CONTACT_MODEL_H_
+#define CONTROLLER_OCP_OCP_CONTACT_MODEL_H_
+
+#include "controller/ocp/ocp_actuation.h"
+#include "controller/ocp/ocp_dense_rows.h"
+#include "controller/ocp/ocp_view.h"
+#include "controller/rbd/rbd_contact_derivatives.h"
+
+#include <cmath>
+#include <cstring>
+#include <utility>
+
+namespace engram {
+
+template <class C> struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Robot>, double> {
+  using R = typename C::Robot;
+  using L = LayoutOf<R>;
+  static constexpr int nf = kContactRows<C>;
+  alignas(64) double D[R::nv][L::nzp];             // d v' / d z                              (nv x nz)
+  alignas(64) double F[nf][L::nzp];                // d lambda / d z, rows of active contacts (nf x nz)
+  alignas(64) double Lz[L::nzp];                   // d l / d z                               (nz)
+  alignas(64) double Hqq[R::nv][padded(R::nv)];    // lower triangle
+  alignas(64) double h[L::nzp];                    // diagonal
+  double H[C::n][6][6];                            // Hessian of the force costs of each contact
+  unsigned forces;                                 // contacts whose H is not zero: bit c for contact c
+
+  // Entry i >= j of the Hessian, padded indices: for tests and comparisons.
+  double hessian(int i, int j) const {
+    double s = (i < R::nv && j < R::nv ? Hqq[i][j] : 0.0) + (i == j ? h[i] : 0.0);
+    for (int c = 0; c < C::n; ++c) {
+      if (!contact_active(forces, c)) continue;
+      const int first = kContactTree<C>.first[c], rows = kContactTree<C>.rows[c];
+      for (int r = 0; r < rows; ++r)
+        for (int t = 0; t < rows; ++t) s += F[first + r][i] * H[c][r][t] * F[first + t][j];
+    }
+    return s;
+  }
+};
+
+// The first n rows of a knot's Hessian but for F' H F, lower triangle up to the padding, into rows of ld.
+template <class C, int ld> inline void copy_hessian(const ContactKnotModel<C>& m, int n, double (*to)[ld]) {
+  constexpr int nv = C::Robot::nv;
+  for (int i = 0; i < n; ++i) {
+    std::memset(to[i], 0, padded(i + 1) * sizeof(double));
+    if (i < nv) std::memcpy(to[i], m.Hqq[i], (i + 1) * sizeof(double));
+    else to[i][i] = m.h[i];
+  }
+}
+
+// Calls f(c) for every contact of C, active or not, c a compile-time constant.
+template <class C, class F, int... c> inline void for_contact(F f, std::integer_sequence<int, c...>) {
+  (f(std::integral_constant<int, c>{}), ...);
+}
+template <class C, class F> inline void for_contact(F f) { for_contact<C>(f, std::make_integer_sequence<int, C::n>{}); }
+
+// What the lanes of kLanes knots leave for the dense step.
+template <class C> struct ContactLanes {
+  using R = typename C::Robot;
+  RbdData<R, Pack> d;
+  ContactData<C, Pack> cd;
+  ContactDerivatives<C, R::nu, Pack> x;
+  ModelOf<R, Pack> cost;              // base blocks, gradient and Hessian of the costs of state and control
+  Pack g[kContactRows<C>];            // gradient of the force costs
+  Pack H[C::n][6][6];                 // their Hessian
+};
+
+// Fills D, F, E and G of the model of one lane. step: dt of a knot in time, 1 of an impact.
+template <class C>
+inline void contact_finish_dynamics(const ContactLanes<C>& in, int lane, unsigned active, double step, ContactKnotModel<C>& m) {
+  using R = typename C::Robot;
+  using L = LayoutOf<R>;
+  constexpr const ContactTree<C>& tree = kContactTree<C>;
+  constexpr int nv = R::nv, nu = R::nu, nzp = L::nzp, nf = kContactRows<C>;
+  const ActiveRows<C> rows(active);
+  double coefficient[nf + nv];
+  const double* row[nf + nv];
+
+  // F = G^-1 B
+  for (int I = 0; I < rows.n; ++I) {
+    const int r = rows.row[I];
+    double* const f = m.F[r];
+    std::memset(f, 0, sizeof(m.F[r]));
+    for (int k = 0; k < nv; ++k) f[L::oq + k] = in.x.Bq[r][k].l[lane];
+    for (int k = 0; k < nv; ++k) f[L::ov + k] = in.x.Bv[r][k].l[lane];
+    for (int k = 0; k < nu; ++k) f[L::ou + k] = in.x.Bu[r][k].l[lane];
+    for (int K = 0; K < I; ++K) {
+      coefficient[K] = -in.cd.G[r][rows.row[K]].l[lane];
+      row[K] = m.F[rows.row[K]];
+    }
+    dense_rows::combine<nzp>(f, I, coefficient, row, in.cd.G_inv[r].l[lane]);
+  }
+  for (int I = rows.n - 1; I >= 0; --I) {
+    int n = 0;
+    for (int K = I + 1; K < rows.n; ++K, ++n) {
+      coefficient[n] = -in.cd.G[rows.row[K]][rows.row[I]].l[lane];
+      row[n] = m.F[rows.row[K]];
+    }
+    dense_rows::combine<nzp>(m.F[rows.row[I]], n, coefficient, row, in.cd.G_inv[rows.row[I]].l[lane]);
+  }
+
+  // step L^-1 (U F - D^-1 X), row by row from the root
+  for (int k = 0; k < nv; ++k) {
+    double* const out = m.D[k];
+    std::memset(out, 0, sizeof(m.D[k]));
+    const double scale = -step * in.d.D_inv[k].l[lane];
+    const auto copy = [&](int j) {
+      out[L::oq + j] = scale * in.x.Xq(k, j).l[lane];
+      out[L::ov + j] = scale * in.x.Xv(k, j).l[lane];
+    };
+    for (int j = kTree<R>.parent[k]; j >= 0; j = kTree<R>.parent[j]) copy(j);
+    for (int j = k; j < kTree<R>.end[k]; ++j) copy(j);
+    for (int j = 0; j < nu; ++j)
+      if (const int dof = Actuation<R>::dof(j); dof < 0 || (dof >= k && dof < kTree<R>.end[k])) out[L::ou + j] = scale * in.x.Xu[k][j].l[lane];
+    int n = 0;
+    for (int c = 0; c < C::n; ++c) {
+      if (!contact_active(active, c) || !tree.moves(k, c)) continue;
+      for (int r = 0; r < tree.rows[c]; ++r, ++n) {
+        coefficient[n] = step * in.cd.U[c][tree.shared[c][k] - 1][r].l[lane];
+        row[n] = m.F[tree.first[c] + r];
+      }
+    }
+    for (int j = kTree<R>.parent[k]; j >= 0; j = kTree<R>.parent[j], ++n) {
+      coefficient[n] = -in.d.L(k, j).l[lane];
+      row[n] = m.D[j];
+    }
+    dense_rows::combine<nzp>(out, n, coefficient, row, 1.0);
+  }
+  for (int k = 0; k < nv; ++k) m.D[k][L::ov + k] += 1.0;
+
+  // forces turn with the world's axes, not with the body: + w_k x lambda
+  for (int c = 0; c < C::n; ++c) {
+    if (!contact_active(active, c)) continue;
+    for (int part = 0; part < tree.rows[c]; part += 3)
+      for (int a = 0; a < tree.path_n[c]; ++a) {
+        const int first = tree.first[c] + part, k = L::oq + tree.path[c][a];
+        const Vec3<Pack>& w = in.cd.J[c][a].ang;
+        for (int i = 0; i < 3; ++i) {
+          const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+          m.F[first + i][k] += w[i1].l[lane] * in.cd.lambda[first + i2].l[lane] - w[i2].l[lane] * in.cd.lambda[first + i1].l[lane];
+        }
+      }
+  }
+
+  if constexpr (kFreeBase<R>)
+    for (int i = 0; i < 36; ++i) {
+      m.E.data()[i] = in.cost.E.data()[i].l[lane];
+      m.G.data()[i] = in.cost.G.data()[i].l[lane];
+    }
+}
+
+// Fills the costs of the model of one lane, those of the forces for active contacts. After contact_finish_dynamics if any is active.
+template <class C> inline void contact_finish_costs(const ContactLanes<C>& in, int lane, unsigned active, ContactKnotModel<C>& m) {
+  using R = typename C::Robot;
+  using L = LayoutOf<R>;
+  constexpr const ContactTree<C>& tree = kContactTree<C>;
+  constexpr int nv = R::nv, nzp = L::nzp;
+  for (int i = 0; i < nzp; ++i) {
+    m.Lz[i] = in.cost.Lz[i].l[lane];
+    m.h[i] = i < nv ? 0.0 : in.cost.Lzz[i][i].l[lane];
+  }
+  for (int i = 0; i < nv; ++i)
+    for (int j = 0; j <= i; ++j) m.Hqq[i][j] = in.cost.Lzz[i][j].l[lane];
+  m.forces = 0;
+  for (int c = 0; c < C::n; ++c) {
+    if (!contact_active(active, c)) continue;
+    double largest = 0.0;
+    for (int r = 0; r < tree.rows[c]; ++r)
+      for (int t = 0; t < tree.rows[c]; ++t) {
+        m.H[c][r][t] = in.H[c][r][t].l[lane];
+        largest += std::fabs(m.H[c][r][t]);
+      }
+    if (!(largest == 0.0)) m.forces |= 1u << c;
+    double coefficient[6];
+    const double* row[6];
+    for (int r = 0; r < tree.rows[c]; ++r) {
+      coefficient[r] = in.g[tree.first[c] + r].l[lane];
+      row[r] = m.F[tree.first[c] + r];
+    }
+    if (contact_active(m.forces, c)) dense_rows::combine<nzp>(m.Lz, tree.rows[c], coefficient, row, 1.0);
+  }
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_OCP_OCP_CONTACT_MODEL_H_

@@ -1,0 +1,34 @@
+// Linear combinations of long rows, kept in registers over the whole sum.
+#ifndef CONTROLLER_OCP_OCP_DENSE_ROWS_H_
+#define CONTROLLER_OCP_OCP_DENSE_ROWS_H_
+
+#include "controller/ocp/ocp_knot_model.h"
+
+namespace engram::dense_rows {
+
+typedef double Vector __attribute__((vector_size(kVector * sizeof(double)), aligned(kVector * sizeof(double)), may_alias));
+inline Vector& vec(double* p) { return *reinterpret_cast<Vector*>(p); }
+inline const Vector& vec(const double* p) { return *reinterpret_cast<const Vector*>(p); }
+
+template <int nr>
+inline __attribute__((always_inline)) void combine_block(double* y, int at, int terms, const double* coefficient, const double* const* row,
+                                                         double scale) {
+  Vector c[nr];
+  for (int j = 0; j < nr; ++j) c[j] = vec(y + at + j * kVector);
+  for (int t = 0; t < terms; ++t) {
+    const double a = coefficient[t];
+    const double* const x = row[t] + at;
+    for (int j = 0; j < nr; ++j) c[j] += a * vec(x + j * kVector);
+  }
+  for (int j = 0; j < nr; ++j) vec(y + at + j * kVector) = scale * c[j];
+}
+
+// y <- scale (y + sum_t coefficient[t] row[t]), rows of n doubles, n a multiple of kVector.
+template <int n> inline void combine(double* y, int terms, const double* coefficient, const double* const* row, double scale) {
+  constexpr int nr = 7, whole = n / (nr * kVector) * nr * kVector, rest = (n - whole) / kVector;
+  for (int at = 0; at < whole; at += nr * kVector) combine_block<nr>(y, at, terms, coefficient, row, scale);
+  if constexpr (rest > 0) combine_block<rest>(y, whole, terms, coefficient, row, scale);
+}
+
+}  // namespace engram::dense_rows
+#endif  // CONTROLLER_OCP_OCP_DENSE_ROWS_H_
