@@ -18,8 +18,7 @@ namespace engram::binding {
 namespace nb = nanobind;
 
 // What numpy passes: copied to C order and double if it is neither.
-template <int dimensions>
-using In = nb::ndarray<const double, nb::ndim<dimensions>, nb::c_contig, nb::device::cpu>;
+template <int dimensions> using In = nb::ndarray<const double, nb::ndim<dimensions>, nb::c_contig, nb::device::cpu>;
 using Out = nb::ndarray<nb::numpy, double>;
 
 // Refuses an array whose sizes are not the expected ones (-1: any).

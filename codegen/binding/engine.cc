@@ -6,4 +6,6 @@ NB_MODULE(_engine, engine) {
   engine.doc() = "Compiled robots, optimal control problems and solvers of Engram.";
   engram::binding::bind_robots(engine);
   engram::binding::bind_arm(engine);
+  engram::binding::bind_reach(engine);
+  engram::binding::bind_memory(engine);
 }

@@ -28,7 +28,7 @@ template <class Tab> struct HeldTable {
     head.name = name.c_str();
     head.robot_digest = robot_digest;
     head.task_digest = task_digest;
-    head.nin = int(nb::len(source.attr("inputs")));
+    head.nin = int(nb::cast<nb::list>(source.attr("inputs")).size());
     head.nout = nb::cast<int>(source.attr("outputs"));
     for (nb::handle item : source.attr("arrays")()) {
       const auto flat = nb::cast<nb::ndarray<const float, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(item.attr("flat"));

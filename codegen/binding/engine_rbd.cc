@@ -19,8 +19,7 @@ namespace {
 using namespace nb::literals;
 
 // Row r of a batch into every lane of `out`; lanes beyond the last row repeat it.
-template <class S>
-void load(const double* rows, int n, int size, int first, S* out) {
+template <class S> void load(const double* rows, int n, int size, int first, S* out) {
   for (int l = 0; l < lanes_of<S>; ++l) {
     const double* row = rows + std::min(first + l, n - 1) * size;
     for (int i = 0; i < size; ++i) set_lane(out[i], l, row[i]);
@@ -28,15 +27,13 @@ void load(const double* rows, int n, int size, int first, S* out) {
 }
 
 // Lanes of `in` to rows first, first + 1, ... of a batch; those beyond the last row are dropped.
-template <class S>
-void store(const S* in, int size, int n, int first, double* rows) {
+template <class S> void store(const S* in, int size, int n, int first, double* rows) {
   for (int l = 0; l < lanes_of<S> && first + l < n; ++l)
     for (int i = 0; i < size; ++i) rows[(first + l) * size + i] = lane(in[i], l);
 }
 
 // Calls f(S{}, first row) over a batch of n: S = double row by row, or S = Pack.
-template <class F>
-void over_batch(int n, bool lanes, F f) {
+template <class F> void over_batch(int n, bool lanes, F f) {
   nb::gil_scoped_release release;
   if (lanes)
     for (int i = 0; i < n; i += kLanes) f(Pack{}, i);
@@ -44,12 +41,10 @@ void over_batch(int n, bool lanes, F f) {
     for (int i = 0; i < n; ++i) f(double{}, i);
 }
 
-template <class R>
-class Robot {
+template <class R> class Robot {
   static constexpr int nq = R::nq, nv = R::nv;
   using Batch = In<2>;
-  template <class S>
-  using Square = Mat<S, nv, nv>;
+  template <class S> using Square = Mat<S, nv, nv>;
 
  public:
   static Out rnea(const Batch& q, const Batch& v, const Batch& a, bool lanes) {
@@ -213,8 +208,7 @@ class Robot {
   }
 
   // out = f(q, v, w) for each state
-  template <class F>
-  static Out vectors(const Batch& q, const Batch& v, const Batch& w, bool lanes, F f) {
+  template <class F> static Out vectors(const Batch& q, const Batch& v, const Batch& w, bool lanes, F f) {
     const int n = batch_of("q", q, nq);
     same_batch("v", v, n);
     same_batch("third argument", w, n);

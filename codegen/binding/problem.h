@@ -5,6 +5,7 @@
 #include "codegen/binding/arrays.h"
 #include "codegen/offline/ipopt_shooting.h"
 #include "controller/fddp/fddp_solve.h"
+#include "controller/loop/loop_merit.h"
 
 #include <nanobind/stl/string.h>
 
@@ -33,8 +34,7 @@ inline const char* words(FddpStatus status) {
 }
 
 // At most N knots with a control. A derived class fills h.
-template <class P_, int N_>
-class Problem {
+template <class P_, int N_> class Problem {
  public:
   using P = P_;
   using L = typename P::Layout;
@@ -109,6 +109,25 @@ class Problem {
     return nb::make_tuple(gains(), k.release());
   }
 
+  // Merits (m) of the trajectories xs (m, T + 1, nx), us (m, T, nu).
+  Out merit(const In<3>& xs, const In<3>& us) {
+    check_shape<3>("xs", xs, {-1, h().n + 1, nx});
+    check_shape<3>("us", us, {long(xs.shape(0)), h().n, nu});
+    const std::size_t m = xs.shape(0), T = h().n;
+    std::vector<Candidate<P>> candidates(m);
+    for (std::size_t i = 0; i < m; ++i) {
+      candidates[i].x = reinterpret_cast<const double(*)[nx]>(xs.data() + i * (T + 1) * nx);
+      candidates[i].u = reinterpret_cast<const double(*)[nu]>(us.data() + i * T * nu);
+    }
+    {
+      nb::gil_scoped_release release;
+      loop_merit(h(), candidates.data(), int(m));
+    }
+    NewArray merit({m});
+    for (std::size_t i = 0; i < m; ++i) merit.data()[i] = candidates[i].merit;
+    return merit.release();
+  }
+
   nb::dict solve(const In<2>& xs, const In<2>& us, int iterations, double stop, bool box, int step_lengths, double reg) {
     if (step_lengths < 1 || step_lengths > kMaxStepLengths)
       throw nb::value_error(("step_lengths: expected 1 .. " + std::to_string(kMaxStepLengths)).c_str());
@@ -142,9 +161,8 @@ class Problem {
     return result;
   }
 
-  template <class Path>
-  nb::dict solve_nlp(const In<2>& xs, const In<2>& us, const offline::IpoptOptions& options,
-                     const offline::StateBounds<P>& bounds, const Path& path) {
+  template <class Path> nb::dict solve_nlp(const In<2>& xs, const In<2>& us, const offline::IpoptOptions& options,
+                                           const offline::StateBounds<P>& bounds, const Path& path) {
     load(xs, us);
     offline::IpoptResult found;
     {
@@ -211,8 +229,7 @@ class Problem {
   }
 
   // Fx = [E 0; 0 0] + [dt G; I] Dx,   Fu = [dt G; I] Du
-  template <class Model>
-  static void dense(const Model& m, double dt, double* Fx, double* Fu) {
+  template <class Model> static void dense(const Model& m, double dt, double* Fx, double* Fu) {
     const auto E = [&m](int i, int j) -> double {
       if constexpr (P::kFreeBase)
         if (i < 6 && j < 6) return m.E[i][j];
@@ -248,8 +265,7 @@ class Problem {
 };
 
 // Binds what all problems share.
-template <class C, class Class>
-void bind_problem(Class& c) {
+template <class C, class Class> void bind_problem(Class& c) {
   using namespace nb::literals;
   c.def_prop_ro("T", &C::knots, "Knots with a control.")
       .def_prop_ro_static("nx", [](nb::handle) { return C::nx; })
@@ -264,6 +280,7 @@ void bind_problem(Class& c) {
            "cost.")
       .def("direction", &C::direction, "xs"_a, "us"_a, "reg"_a = 0.0,
            "Gains K (T, nu, ndx) and feed-forward k (T, nu) at a trajectory.")
+      .def("merit", &C::merit, "xs"_a, "us"_a, "Merits (m) of m trajectories: cost + 10 L1 norm of the gaps.")
       .def("solve", &C::solve, "xs"_a, "us"_a, "iterations"_a = 100, "stop"_a = FddpOpts{}.stop, "box"_a = FddpOpts{}.box,
            "step_lengths"_a = FddpOpts{}.step_lengths, "reg"_a = FddpOpts{}.reg_init,
            "FDDP from a guess: xs, us, K (T, nu, ndx), cost, status in words, converged, feasible, iterations, and the log "

@@ -13,8 +13,7 @@
 namespace engram::offline {
 
 // Hard bounds, the same at every knot; by default none.
-template <class P>
-struct StateBounds {
+template <class P> struct StateBounds {
   std::vector<double> x_lo = std::vector<double>(P::nx, -std::numeric_limits<double>::infinity());
   std::vector<double> x_hi = std::vector<double>(P::nx, std::numeric_limits<double>::infinity());
   bool control_box = false;  // P::u_lo <= u <= P::u_hi
@@ -27,8 +26,7 @@ struct PathConstraint {
 };
 
 // Where things stand among the variables z = (x_0 u_0 x_1 u_1 ... x_n), and the program over them.
-template <class P, int N>
-class Shooting {
+template <class P, int N> class Shooting {
   static_assert(!P::kFreeBase, "the state is taken as a plain vector");
   using L = typename P::Layout;
   using Model = KnotModel<L, P::kFreeBase, double>;
