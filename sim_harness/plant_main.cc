@@ -94,7 +94,6 @@ class Plant {
   bool answer_step();
   void brake(double* tau) const;
   bool finished() const;
-  bool log_this_step() const { return t_ < o_.log_full || (state_.seq - 1) % o_.log_every == 0; }
 
   const PlantOptions o_;
   const bool lock_step_;
@@ -131,12 +130,12 @@ std::string Plant::init() {
   }
   const uint64_t digest = o_.robot_digest ? o_.robot_digest : model_.robot_digest ? model_.robot_digest : series_.robot_digest;
   wrong = faults_.init(o_.faults, model_);
-  if (wrong.empty() && !o_.log.empty()) wrong = log_.open(o_.log.c_str());
+  if (wrong.empty() && !o_.log.empty()) wrong = log_.open(o_.log.c_str(), static_cast<int64_t>(o_.log_full * 1e6), o_.log_every);
   if (wrong.empty() && !o_.timing.empty()) {
     timing_ = std::fopen(o_.timing.c_str(), "w");
     if (!timing_) wrong = "cannot write '" + o_.timing + "'";
   }
-  if (wrong.empty()) wrong = link_.open(o_.url.c_str(), digest, model_.nu, o_.log.empty() ? nullptr : &log_, timing_);
+  if (wrong.empty()) wrong = link_.open(o_.url.c_str(), digest, model_.nu, &log_, timing_);
   state_.robot_digest = static_cast<int64_t>(digest);
   state_.nq = model_.nq, state_.nv = model_.nv;
   task_.task_digest = static_cast<int64_t>(series_.task_digest);
@@ -174,7 +173,7 @@ void Plant::begin_step() {
   link_.publish_state(state_);
 
   mj_step1(model_.m, model_.d);
-  if (log_this_step()) log_.add(utime_, EventLog::kState, kStateChannel, link_.state_bytes(), link_.state_size());
+  if (log_.keeps(utime_, state_.seq)) log_.add(utime_, EventLog::kState, kStateChannel, link_.state_bytes(), link_.state_size());
   log_.flush(utime_);
   if (const JumpRecord* r = judge_.judge(model_, t_)) {
     std::printf("jump %d/%d %s %.2f s\n", r->jump, series_.jump_count(), r->reason().c_str(), r->t_end - r->t_start);

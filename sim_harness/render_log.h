@@ -26,8 +26,7 @@ struct RunLog {
 };
 
 // The entry of the latest time up to `utime`, or nullptr.
-template <class T>
-const T* latest(const std::map<int64_t, T>& series, int64_t utime) {
+template <class T> const T* latest(const std::map<int64_t, T>& series, int64_t utime) {
   auto after = series.upper_bound(utime);
   return after == series.begin() ? nullptr : &std::prev(after)->second;
 }

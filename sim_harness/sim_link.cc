@@ -94,7 +94,8 @@ void Link::on_command(const lcm_recv_buf_t* buf, const char*, void* self) {
   if (command.seq <= link.command_.seq) return;  // answer to a repeated state
   link.command_ = command;
   link.answered_ = command.seq == link.seq_;
-  if (link.log_) link.log_->add(command.utime, EventLog::kCommand, kCommandChannel, buf->data, static_cast<int>(buf->data_size));
+  if (link.log_->keeps(command.utime, command.seq))
+    link.log_->add(command.utime, EventLog::kCommand, kCommandChannel, buf->data, static_cast<int>(buf->data_size));
 }
 
 void Link::on_cycle(const lcm_recv_buf_t* buf, const char*, void* self) {
@@ -104,7 +105,7 @@ void Link::on_cycle(const lcm_recv_buf_t* buf, const char*, void* self) {
     return link.refuse(&link.refused_.malformed,
                        "ENGRAM_CYCLE is truncated or of another type; build both sides from one checkout");
   }
-  if (link.log_) link.log_->add(cycle.utime, EventLog::kCycle, kCycleChannel, buf->data, static_cast<int>(buf->data_size));
+  link.log_->add(cycle.utime, EventLog::kCycle, kCycleChannel, buf->data, static_cast<int>(buf->data_size));
 }
 
 void Link::on_timing(const lcm_recv_buf_t* buf, const char*, void* self) {

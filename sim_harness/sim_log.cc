@@ -10,9 +10,9 @@
 
 namespace engram::sim {
 
-std::string EventLog::open(const char* path) {
+std::string EventLog::open(const char* path, int64_t full, int every) {
   std::signal(SIGXFSZ, SIG_IGN);  // a file size limit is an error of write(), like a full disk
-  path_ = path;
+  path_ = path, full_ = full, every_ = every;
   errno = 0;
   log_ = lcm_eventlog_create(path, "w");
   if (!log_) return "cannot write the log '" + path_ + "': " + std::strerror(errno);

@@ -22,7 +22,10 @@ class EventLog {
   EventLog& operator=(const EventLog&) = delete;
   ~EventLog() { close(); }
 
-  std::string open(const char* path);  // empty string, or one line that says what is wrong
+  // Empty string, or one line that says what is wrong. After `full` us only each `every`-th state and its command are kept.
+  std::string open(const char* path, int64_t full, int every);
+  // Whether the log takes the state `seq` of time `utime`, and the command that answers it.
+  bool keeps(int64_t utime, int64_t seq) const { return log_ && (utime < full_ || (seq - 1) % every_ == 0); }
   void add(int64_t utime, Rank rank, const char* channel, const void* data, int size);
   void flush(int64_t now);  // writes what lies more than kHoldBack before `now`
   void close();             // writes the rest
@@ -44,6 +47,8 @@ class EventLog {
 
   lcm_eventlog_t* log_ = nullptr;
   std::string path_;
+  int64_t full_ = 0;
+  int every_ = 1;
   std::vector<Event> pending_;
   std::vector<char> buffer_;
   bool truncated_ = false;

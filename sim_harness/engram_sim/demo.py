@@ -17,6 +17,7 @@ from engram_sim.pair import Pair, Progress, private_port, scene
 from engram_sim.results import MODES, Run, figures, read_run, read_runs
 from engram_sim.series import write_reach
 
+LOG_EVERY = 20  # plant steps between two states of the log: 50 a second, enough for video and curves
 LOG_TRUNCATED = 3  # exit code of engram-plant: all done, but the disk was full
 SLOWEST_FIRST = ("cold", "shift", "line", "memory")  # so that no long run is left alone at the end
 
@@ -69,7 +70,7 @@ def run_modes(args: argparse.Namespace, modes: list[str], folder: Path, series: 
 
         pair = Pair(folder / mode, series, scene(args.robot, args.task), private_port(MODES.index(mode)), mode, clock=args.clock)
         pair.controller = args.controller
-        pair.plant_options = ["--log-full", str(args.log_full), *options]
+        pair.plant_options = ["--log-full", str(args.log_full), "--log-every", str(LOG_EVERY), *options]
         code = pair.run(jumped)
         if code != 0:
             print(f"\ndemo: {mode} ended with exit code {code}:\n{pair.last_words()}")
@@ -120,7 +121,8 @@ def finish(
     print(f"report  {relative(page)}")
     if drawn:
         print(f"video   {relative(drawn)}")
-    print(f"log     {relative(runs[0].log)}   (engram replay, lcm-logplayer)")
+    megabytes = sum(run.plant["log"]["bytes"] for run in runs) / 1e6
+    print(f"log     {relative(runs[0].log)}   (engram replay, lcm-logplayer; {megabytes:.0f} MB in all modes)")
     for run in runs:
         if run.plant["log"]["truncated"]:
             print(f"demo: the log of {run.mode} is cut short: the disk was full")

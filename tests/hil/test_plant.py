@@ -72,10 +72,11 @@ def test_log_is_read_by_lcm(arena: Arena) -> None:
 
 def test_thinned_log_keeps_ticks_tasks_and_cycles(arena: Arena) -> None:
     run_log(arena, "run.lcm", "--log-full", "0.1", "--log-every", "10")
-    log = eventlog.read(arena.folder / "run.lcm", ["ENGRAM_STATE", "ENGRAM_CYCLE", "ENGRAM_TASK"])
+    log = eventlog.read(arena.folder / "run.lcm", list(eventlog.CHANNELS))
     states = log["ENGRAM_STATE"]
     later = states[states["utime"] >= 100_000]
     assert np.all((later["seq"] - 1) % 10 == 0) and np.array_equal(states["seq"][:100], np.arange(1, 101))
+    assert np.array_equal(log["ENGRAM_COMMAND"]["utime"], states["utime"])
     assert len(log["ENGRAM_TASK"]) == 5 and np.isin(later["utime"], log["ENGRAM_CYCLE"]["utime"]).all()
 
 
