@@ -45,10 +45,9 @@ template <class S> inline Coriolis<S> coriolis_of(const Inertia<S>& Y, const Mot
   return C;
 }
 
-// d tau / d q and d tau / d v (nv x nv each) of rbd_rnea, whose d must be at hand with d.Yc composite (rbd_composite_inertias).
-// Entries of dofs on different branches are zero.
-template <class R, class S>
-inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& dtau_dq, Mat<S, R::nv, R::nv>& dtau_dv) {
+// The entries of d tau / d q and d tau / d v whose dofs lie on one branch; the others are zero and are not written.
+template <class R, class S> inline void rbd_rnea_derivatives_on_branches(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& dtau_dq,
+                                                                         Mat<S, R::nv, R::nv>& dtau_dv) {
   constexpr const Tree<R>& tree = kTree<R>;
   Motion<S> dAdq[R::nv], dAdv[R::nv];
   Vec3<S> dVdq[R::nv];   // angular part: all that C sees
@@ -72,24 +71,23 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
       }
     }
   }
-  dtau_dq.setZero();
-  dtau_dv.setZero();
   for (int k = R::nv - 1; k >= 0; --k) {
     const int i = tree.joint[k];
     const Motion<S>& J = d.J[k];
     // column k, rows towards the root: J_j . dF_k
     const Force<S> dFdv = C[i].times_add(J.ang, d.Yc[i] * dAdv[k]);
     const Force<S> dFdq = C[i].times_add(dVdq[k], d.Yc[i] * dAdq[k]);
-    // seen from the joints before i the force f turns with dof k
-    const Force<S> dFdq_turned = cross_add(J, f[i], dFdq);
-    for (int j = k; j >= 0; j = tree.parent[j]) {
-      dtau_dv(j, k) = dot(d.J[j], dFdv);
-      dtau_dq(j, k) = dot(d.J[j], tree.joint[j] == i ? dFdq : dFdq_turned);
-    }
+    // seen from the joints before i, the force f of the subtree turns with dof k
+    const Force<S> dFdq_turned = R::parent[i] < 0 ? dFdq : cross_add(J, f[i], dFdq);
     // row k, columns towards the root: J_k . (Yc dA_j + C dV_j) = (Yc J_k) . dA_j + g . w(dV_j)
     const Force<S> F = d.Yc[i] * J;
     const Vec3<S> g = C[i].transposed_times(J);
-    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) {
+    dtau_dv(k, k) = dot(J, dFdv);
+    dtau_dq(k, k) = dot(J, dFdq);
+    for (int e = tree.first[k]; e < tree.first[k] + tree.depth[k]; ++e) {
+      const int j = tree.ancestor[e];
+      dtau_dv(j, k) = dot(d.J[j], dFdv);
+      dtau_dq(j, k) = dot(d.J[j], dFdq_turned);
       dtau_dv(k, j) = dot_add(g, d.J[j].ang, dot(dAdv[j], F));
       dtau_dq(k, j) = dot_add(g, dVdq[j], dot(dAdq[j], F));
     }
@@ -101,19 +99,12 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
   }
 }
 
-// X := M^-1 X, row by row (all columns of a row at once), with the factor of rbd_forward_dynamics.
-template <class R, class S> inline void rbd_solve_rows(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& X) {
-  constexpr const Tree<R>& tree = kTree<R>;
-  const auto subtract_row = [&X](int to, S l, int from) {
-    for (int c = 0; c < R::nv; ++c) X(to, c) = nmadd(l, X(from, c), X(to, c));
-  };
-  for (int k = R::nv - 1; k >= 0; --k) {
-    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) subtract_row(j, d.L(k, j), k);
-  }
-  for (int k = 0; k < R::nv; ++k) {
-    for (int c = 0; c < R::nv; ++c) X(k, c) *= d.D_inv[k];
-    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) subtract_row(k, d.L(k, j), j);
-  }
+// d tau / d q and d tau / d v (nv x nv each) of rbd_rnea, after it and rbd_composite_inertias.
+template <class R, class S>
+inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& dtau_dq, Mat<S, R::nv, R::nv>& dtau_dv) {
+  dtau_dq.setZero();
+  dtau_dv.setZero();
+  rbd_rnea_derivatives_on_branches(d, dtau_dq, dtau_dv);
 }
 
 // d a / d q, d a / d v and M^-1 = d a / d tau (nv x nv each):  d a = M^-1 (d tau - dtau_dq dq - dtau_dv dv).
@@ -129,17 +120,12 @@ template <class R, class S> inline void rbd_forward_derivatives(const S* /*q*/, 
     d.A[i] += dA[i];
     d.f[i] = mul_add(d.Y[i], dA[i], d.f[i]);
   }
-  rbd_rnea_derivatives(d, da_dq, da_dv);
-  for (int i = 0; i < R::nv; ++i) {
-    for (int j = 0; j < R::nv; ++j) {
-      da_dq(i, j) = -da_dq(i, j);
-      da_dv(i, j) = -da_dv(i, j);
-      Minv(i, j) = S(i == j ? 1.0 : 0.0);
-    }
-  }
-  rbd_solve_rows(d, da_dq);
-  rbd_solve_rows(d, da_dv);
-  rbd_solve_rows(d, Minv);
+  rbd_rnea_derivatives_on_branches(d, da_dq, da_dv);
+  S minus_D_inv[R::nv];
+  for (int k = 0; k < R::nv; ++k) minus_D_inv[k] = -d.D_inv[k];
+  rbd_factor_solve(d.L, minus_D_inv, da_dq);
+  rbd_factor_solve(d.L, minus_D_inv, da_dv);
+  rbd_factor_inverse(d.L, d.D_inv, Minv);
 }
 
 // d g / d q (nv x nv) after rbd_gravity, whose d.Yc (mass and moment of the subtrees) it reads: rbd_rnea_derivatives at v = a = 0.
@@ -155,10 +141,14 @@ template <class R, class S> inline void rbd_gravity_derivatives(const RbdData<R,
     const Inertia<S>& Y = d.Yc[i];
     const Force<S> f = {up * Y.mass, cross(Y.moment, up)};
     const Force<S> dF = {dA[k] * Y.mass, cross(Y.moment, dA[k])};
-    const Force<S> dF_turned = cross_add(J, f, dF);
-    for (int j = k; j >= 0; j = tree.parent[j]) dg_dq(j, k) = dot(d.J[j], tree.joint[j] == i ? dF : dF_turned);
+    const Force<S> dF_turned = R::parent[i] < 0 ? dF : cross_add(J, f, dF);
     const Vec3<S> F = cross_add<S>(J.ang, Y.moment, J.lin * Y.mass);
-    for (int j = tree.parent[k]; j >= 0; j = tree.parent[j]) dg_dq(k, j) = dot(F, dA[j]);
+    dg_dq(k, k) = dot(J, dF);
+    for (int e = tree.first[k]; e < tree.first[k] + tree.depth[k]; ++e) {
+      const int j = tree.ancestor[e];
+      dg_dq(j, k) = dot(d.J[j], dF_turned);
+      dg_dq(k, j) = dot(F, dA[j]);
+    }
   }
 }
 

@@ -3,6 +3,7 @@
 #define CONTROLLER_RBD_RBD_FORWARD_H_
 
 #include "controller/rbd/rbd_crba.h"
+#include "controller/rbd/rbd_factor.h"
 #include "controller/rbd/rbd_rnea.h"
 
 namespace engram {
@@ -18,8 +19,8 @@ template <class R, class S> inline void rbd_forward_dynamics(const S* q, const S
   for (int k = 0; k < R::nv; ++k) a[k] = tau[k] - a[k];
   rbd_composite_inertias(d);
   rbd_crba_lower(d, d.L);
-  rbd_factor<R>(d.L, d.D_inv);
-  rbd_factor_solve<R>(d.L, d.D_inv, a);
+  rbd_factor(d.L, d.D_inv);
+  rbd_factor_solve(d.L, d.D_inv, a);
 }
 
 }  // namespace engram

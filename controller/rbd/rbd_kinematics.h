@@ -26,8 +26,8 @@ template <class R, class S> struct RbdData {
   Motion<S> A[R::nj];  // body acceleration minus gravity
   Force<S> f[R::nj];   // force that moves the body alone: Y A + V x* Y V
 
-  // written by rbd_forward_dynamics: M = L' D L, L unit lower triangular and as sparse as the tree
-  Mat<S, R::nv, R::nv> L;  // strictly lower part, entries (k, ancestor of k)
+  // written by rbd_forward_dynamics: M = L' D L, L unit lower triangular (its diagonal holds D)
+  BranchMatrix<R, S> L;
   S D_inv[R::nv];
 };
 

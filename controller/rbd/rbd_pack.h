@@ -80,40 +80,53 @@ inline Pack::Mask to_bits(Pack a) { return reinterpret_cast<Pack::Mask>(a.l); }
 inline Pack from_bits(Pack::Mask b) { return Pack(reinterpret_cast<Pack::Lanes>(b)); }
 
 // a b + c, c - a b and a b - c with one rounding. Said aloud rather than left to the compiler, so that every lane, and the scalar,
-// round alike.
+// round alike; by intrinsics, since GCC takes a loop over lanes apart in long functions.
+inline double madd(double a, double b, double c) {
 #ifdef __FP_FAST_FMA
-inline double madd(double a, double b, double c) { return __builtin_fma(a, b, c); }
+  return __builtin_fma(a, b, c);
 #else
-inline double madd(double a, double b, double c) { return a * b + c; }
+  return a * b + c;
 #endif
-inline Pack madd(Pack a, Pack b, Pack c) {
+}
+inline double nmadd(double a, double b, double c) { return madd(-a, b, c); }
+inline double msub(double a, double b, double c) { return madd(a, b, -c); }
+
 #if defined(__AVX512F__) && ENGRAM_LANES == 8
-  return Pack(Pack::Lanes(_mm512_fmadd_pd(a.l, b.l, c.l)));
+inline Pack madd(Pack a, Pack b, Pack c) { return Pack(Pack::Lanes(_mm512_fmadd_pd(a.l, b.l, c.l))); }
+inline Pack nmadd(Pack a, Pack b, Pack c) { return Pack(Pack::Lanes(_mm512_fnmadd_pd(a.l, b.l, c.l))); }
+inline Pack msub(Pack a, Pack b, Pack c) { return Pack(Pack::Lanes(_mm512_fmsub_pd(a.l, b.l, c.l))); }
+inline Pack sqrt(Pack a) { return Pack(Pack::Lanes(_mm512_sqrt_pd(a.l))); }
 #elif defined(__FMA__) && ENGRAM_LANES == 4
-  return Pack(Pack::Lanes(_mm256_fmadd_pd(a.l, b.l, c.l)));
+inline Pack madd(Pack a, Pack b, Pack c) { return Pack(Pack::Lanes(_mm256_fmadd_pd(a.l, b.l, c.l))); }
+inline Pack nmadd(Pack a, Pack b, Pack c) { return Pack(Pack::Lanes(_mm256_fnmadd_pd(a.l, b.l, c.l))); }
+inline Pack msub(Pack a, Pack b, Pack c) { return Pack(Pack::Lanes(_mm256_fmsub_pd(a.l, b.l, c.l))); }
+inline Pack sqrt(Pack a) { return Pack(Pack::Lanes(_mm256_sqrt_pd(a.l))); }
 #else
+inline Pack madd(Pack a, Pack b, Pack c) {
   Pack r;
   for (int i = 0; i < kLanes; ++i) r.l[i] = madd(a.l[i], b.l[i], c.l[i]);
   return r;
-#endif
 }
-template <class S> inline S nmadd(S a, S b, S c) { return madd(-a, b, c); }
-template <class S> inline S msub(S a, S b, S c) { return madd(a, b, -c); }
-
-inline double sqrt(double a) { return std::sqrt(a); }
+inline Pack nmadd(Pack a, Pack b, Pack c) { return madd(-a, b, c); }
+inline Pack msub(Pack a, Pack b, Pack c) { return madd(a, b, -c); }
 inline Pack sqrt(Pack a) {
-#if defined(__AVX512F__) && ENGRAM_LANES == 8
-  return Pack(Pack::Lanes(_mm512_sqrt_pd(a.l)));
-#elif defined(__AVX__) && ENGRAM_LANES == 4
-  return Pack(Pack::Lanes(_mm256_sqrt_pd(a.l)));
-#else
   Pack r;
   for (int i = 0; i < kLanes; ++i) r.l[i] = std::sqrt(a.l[i]);
   return r;
-#endif
 }
+#endif
+
+inline double sqrt(double a) { return std::sqrt(a); }
 inline double abs(double a) { return std::fabs(a); }
 inline Pack abs(Pack a) { return from_bits(to_bits(a) & INT64_MAX); }
+
+// Neighbouring doubles as lanes.
+inline Pack load_pack(const double* from) {
+  Pack a;
+  std::memcpy(&a, from, sizeof a);
+  return a;
+}
+inline void store_pack(Pack a, double* to) { std::memcpy(to, &a, sizeof a); }
 
 // How many values a scalar carries, and lane access that also works on double.
 template <class S> inline constexpr int lanes_of = 1;
