@@ -30,7 +30,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Write <robot>_<task>.npz (X, xs, us, cost, seeds; failures apart) and <robot>_<task>.json (a summary)."""
+    """Write <robot>_<task>.npz (X, xs, us, cost, seeds, arrived; failures apart) and <robot>_<task>.json (a summary)."""
     from engram.learn.reproducible import restart_pinned
 
     restart_pinned()
@@ -69,7 +69,7 @@ def solve_all(spec, n: int, seed: int, workers: int, out: Path) -> dict:
     arrays = chunks.run(neighbours, reach.make_neighbours, (*arguments, first), workers, "data:   neighbours")
 
     good = arrays["outcome"] == reach.OK
-    kept = {key: arrays[key][good] for key in ("X", "xs", "us", "cost", "seeds", "iterations")}
+    kept = {key: arrays[key][good] for key in ("X", "xs", "us", "cost", "seeds", "iterations", "arrived")}
     reasons = [reach.REASONS[outcome] for outcome in arrays["outcome"][~good]]
     failed = {"failed_X": arrays["X"][~good], "failed_seeds": arrays["seeds"][~good], "failed_reason": np.array(reasons, "U40")}
     t = spec.dt * np.arange(spec.knots + 1)
@@ -79,6 +79,7 @@ def solve_all(spec, n: int, seed: int, workers: int, out: Path) -> dict:
         "made_from": made_from,
         "tasks": n,
         "solved": int(good.sum()),
+        "arrived_within_horizon": int(kept["arrived"].sum()),
         "failed": {reason: reasons.count(reason) for reason in sorted(set(reasons))},
         "improved_by_neighbours": int(better),
         "cost_quantiles": dict(zip(("5", "50", "95"), np.quantile(kept["cost"], (0.05, 0.5, 0.95)).tolist(), strict=True)),

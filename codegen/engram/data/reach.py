@@ -27,6 +27,9 @@ NEAR = 0.7  # rad, standard deviation of these
 REACHED = 1e-6  # m, rad
 SAME_POSTURE = 0.05  # rad, closer in every joint counts as one posture
 NEIGHBOURS = 3  # whose motions are tried in pass 2
+# A motion counts as solved if it ends within this many times the tolerances of success: the horizon is half the time a jump is
+# given, and a motion that speed limits keep from arriving in it, but which is nearly there, is worth remembering.
+NEARLY = 4.0
 NEIGHBOUR_WEIGHTS = (1.0, 4.0, 1.0, 0.5)  # of q, p_WT, target z axis, target x axis
 
 OK, NO_POSTURE, NOT_CONVERGED, MISSED, COLLIDES = range(5)
@@ -126,12 +129,16 @@ class ReachSolver:
     def judge(self, solution: dict, vector: np.ndarray) -> int:
         """OK or the first reason against a solution."""
         q = solution["xs"][:, : len(self.q_lo)]
-        position, rotation = self.problem.error(q[-1:], vector)[0]
         if not solution["converged"]:
             return NOT_CONVERGED
-        if position > self.spec.success["position"] or rotation > self.spec.success["rotation"]:
+        if not self.within(solution["xs"], vector, NEARLY):
             return MISSED
         return OK if self.problem.clearance(q).min() > 0.0 else COLLIDES
+
+    def within(self, xs: np.ndarray, vector: np.ndarray, tolerances: float = 1.0) -> bool:
+        """Does a motion end within `tolerances` times the tolerances of success?"""
+        position, rotation = self.problem.error(xs[-1:, : len(self.q_lo)], vector)[0]
+        return position <= tolerances * self.spec.success["position"] and rotation <= tolerances * self.spec.success["rotation"]
 
     def best(self, guesses: Sequence[np.ndarray], vector: np.ndarray, known: dict | None = None) -> dict:
         """The cheapest successful motion among `known` and those solved from the guesses xs (m, ...), us (m, ...).
@@ -155,6 +162,7 @@ class ReachSolver:
             "us": found["us"],
             "cost": found["cost"],
             "iterations": found["iterations"],
+            "arrived": self.within(found["xs"], task.vector),
             "outcome": found["outcome"],
         }
 
