@@ -7,6 +7,25 @@ from pathlib import Path
 
 import pytest
 
+USER = r"""
+#include <stdio.h>
+#include "controller/engram.h"
+static unsigned char memory[2000000];
+int main(void) {
+  engram_controller* arm;
+  const engram_error error = engram_init(&engram_panda_reach, memory, sizeof memory, NULL, &arm);
+  printf("%s %s\n", engram_describe(&engram_panda_reach)->robot, engram_error_text(error));
+  return error;
+}
+"""
+
+
+def run(*command: object, cwd: Path) -> str:
+    """Output of a command that must succeed."""
+    done = subprocess.run([str(c) for c in command], check=False, cwd=cwd, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
+    return done.stdout
+
 
 @pytest.fixture(scope="module")
 def exported(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -21,12 +40,27 @@ def test_only_the_controller_and_its_tables_are_exported(exported: Path) -> None
 
 
 def test_the_exported_folder_builds(exported: Path) -> None:
+    """By CMake; the archives serve a C program."""
     build = exported / "build"
-    for command in (["cmake", "-S", exported, "-B", build], ["cmake", "--build", build, "-j", "2"]):
-        done = subprocess.run(command, check=False, capture_output=True, text=True, stdin=subprocess.DEVNULL)
-        assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
-    assert list(build.glob("**/libengram_panda_reach.a"))
+    run("cmake", "-S", exported, "-B", build, cwd=exported)
+    run("cmake", "--build", build, "-j", "2", cwd=exported)
     assert "lcm" not in (build / "CMakeCache.txt").read_text(encoding="utf-8").lower()
+    archives = [*build.glob("**/libengram_panda_reach.a"), *build.glob("tables/*.a"), *build.glob("**/libengram_tab.a")]
+    (exported / "user.c").write_text(USER, encoding="utf-8")
+    run("cc", "-std=c11", "-I.", "user.c", *archives, "-lm", "-o", build / "user", cwd=exported)
+    assert run(build / "user", cwd=exported) == "panda no error\n"
+
+
+def test_it_builds_without_cmake(exported: Path, tmp_path: Path) -> None:
+    """By plain compiler calls. -O1: it is to be built, not to be fast."""
+    tables = exported / "tables/panda_reach"
+    flags = ["-O1", "-march=x86-64-v3", f"-I{exported}", f"-I{tables}", "-c"]
+    sources = [*exported.glob("controller/*.cc"), *exported.glob("controller/tab/*.cc")]
+    run("c++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-isystem", "/usr/include/eigen3", *flags, *sources, cwd=tmp_path)
+    (tmp_path / "user.c").write_text(USER, encoding="utf-8")
+    run("cc", "-std=c11", *flags, *tables.glob("*.c"), *tables.glob("*.S"), "user.c", cwd=tmp_path)
+    run("cc", *tmp_path.glob("*.o"), "-lm", "-o", "user", cwd=tmp_path)
+    assert run("./user", cwd=tmp_path) == "panda no error\n"
 
 
 def test_a_folder_that_is_in_use_is_left_alone(root: Path, tmp_path: Path) -> None:
