@@ -34,7 +34,7 @@ def svg(fig) -> str:
     text = io.StringIO()
     fig.savefig(text, format="svg", metadata={"Date": None}, transparent=True)
     plt.close(fig)
-    return re.sub(r"^.*?(?=<svg)", "", text.getvalue(), flags=re.S)
+    return re.sub(r"^.*?(?=<svg)|<metadata>.*?</metadata>", "", text.getvalue(), flags=re.S)
 
 
 def success(runs: list[Run]) -> str:
