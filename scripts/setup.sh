@@ -3,7 +3,7 @@
 #
 #   scripts/setup.sh [packages] [python] [build] [network]     no argument: all four, in this order
 #
-# PYTHON=/path/to/python3.11 chooses the interpreter. JOBS=n sets the number of parallel compilations.
+# PYTHON=/path/to/python3.11 chooses the interpreter. JOBS=n sets the number of parallel compilations. TARGETS="a b" builds these only.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 . scripts/common.sh
@@ -94,11 +94,12 @@ pip_install() {
 
 setup_build() {
   configure build Release
-  if ninja -C build -n 2> /dev/null | grep -q 'no work to do'; then
+  local targets=(${TARGETS:-all})
+  if ninja -C build -n "${targets[@]}" 2> /dev/null | grep -q 'no work to do'; then
     say build "build/ is up to date"
   else
     say build "compiling into build/ (minutes the first time, seconds after that)"
-    compile build
+    compile build "${targets[@]}"
   fi
 }
 
