@@ -1,24 +1,28 @@
 # The front doors of Engram. Every target sets up what it needs and skips what is done.
-# SEED=n selects another series of tasks, JOBS=n the number of parallel compilations, PYTHON=... the interpreter.
+# SEED=n selects another series of tasks, JOBS=n the number of parallel compilations, PYTHON=... the interpreter; ARGS="..." goes
+# to the command behind the target.
 SHELL := /bin/bash
-export JOBS PYTHON SEED
+SEED ?= 1
+export JOBS PYTHON
 
 .PHONY: help demo test bench tables clean setup
 help:
 	@echo "make demo    run the arm that remembers: video, report and summary in runs/<time>/   (SEED=n)"
 	@echo "make test    build everything and run every test"
 	@echo "make bench   time the controller beside its peers"
-	@echo "make tables  rebuild the generated tables from models/ and data"
+	@echo "make tables  rebuild the generated tables from models/"
 	@echo "make clean   remove everything that was built (runs/ and .venv/ stay)"
 
 setup:
 	@scripts/setup.sh
 
+# The demo needs three programs; the tests and the offline side can wait.
+demo: export TARGETS = engram-controller engram-plant engram-render
 demo: setup
-	@scripts/demo.sh
+	@.venv/bin/engram demo --seed $(SEED) $(ARGS)
 
 test: setup
-	@scripts/test.sh
+	@scripts/test.sh $(ARGS)
 
 bench: setup
 	@.venv/bin/python bench/run.py $(ARGS)

@@ -15,7 +15,7 @@ fail() {
   exit 1
 }
 
-# content_hash <file>...: one digest of the contents.
+# content_hash [file]...: one digest of the contents, of standard input without a file.
 content_hash() { cat "$@" | sha256sum | cut -d ' ' -f 1; }
 
 # configure <dir> <build type> [cmake option]...: runs CMake unless this configuration is there already.

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Makes this checkout ready to run: Debian packages, Python environment, build. Safe to run again: what is done is skipped.
 #
-#   scripts/setup.sh [packages] [python] [build] [network]     no argument: all four, in this order
+#   scripts/setup.sh [packages] [python] [build] [scene] [network]     no argument: all, in this order
 #
 # PYTHON=/path/to/python3.11 chooses the interpreter. JOBS=n sets the number of parallel compilations. TARGETS="a b" builds these only.
 set -euo pipefail
@@ -103,6 +103,19 @@ setup_build() {
   fi
 }
 
+# The renderer's scenes: meshes of the robot and the world around it, from models/ into build/.
+setup_scene() {
+  local stamp
+  stamp=$(find models codegen/engram/robots codegen/engram/tasks -type f ! -name '*.pyc' | sort | xargs sha256sum | content_hash)
+  if [ "$(cat build/scene/stamp 2> /dev/null)" = "$stamp" ]; then
+    say scene "meshes are up to date"
+  else
+    say scene "writing meshes and scene of the Panda"
+    .venv/bin/engram task panda reach --meshes > build/logs/scene.log 2>&1 < /dev/null || fail "no scene, see build/logs/scene.log" "read it"
+    echo "$stamp" > build/scene/stamp
+  fi
+}
+
 # LCM speaks UDP multicast; a machine without any network has no route for it, so the loopback interface gets one.
 setup_network() {
   if ip route get "$lcm_group" > /dev/null 2>&1; then
@@ -115,10 +128,10 @@ setup_network() {
   fi
 }
 
-[ $# -gt 0 ] || set -- packages python build network
+[ $# -gt 0 ] || set -- packages python build scene network
 for step in "$@"; do
   case $step in
-    packages | python | build | network) "setup_$step" ;;
-    *) fail "unknown step $step" "steps: packages python build network" ;;
+    packages | python | build | scene | network) "setup_$step" ;;
+    *) fail "unknown step $step" "steps: packages python build scene network" ;;
   esac
 done

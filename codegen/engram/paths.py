@@ -12,3 +12,9 @@ def relative(path: Path) -> str:
     """`path` as seen from the repository root if it lies inside, for messages and provenance lines."""
     path = Path(path).resolve()
     return str(path.relative_to(ROOT)) if path.is_relative_to(ROOT) else str(path)
+
+
+def write_changed(path: Path, text: str) -> None:
+    """Write `text` unless the file holds it already: what is unchanged is not compiled again."""
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")

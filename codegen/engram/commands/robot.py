@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from engram.paths import BUILD, MODELS, TABLES, relative
+from engram.paths import BUILD, MODELS, TABLES, relative, write_changed
 
 EXAMPLES = """examples:
   engram robot panda            constants and MuJoCo model of models/panda/robot.toml
@@ -36,8 +36,8 @@ def run(args: argparse.Namespace) -> int:
         tree = build(spec)
         folder = args.tables / tree.name
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / "robot.h").write_text(robot_header(tree), encoding="utf-8")
-        (folder / "robot.xml").write_text(robot_mjcf(tree), encoding="utf-8")
+        write_changed(folder / "robot.h", robot_header(tree))
+        write_changed(folder / "robot.xml", robot_mjcf(tree))
         print(
             f"robot:  {relative(folder)}/robot.h robot.xml  nq {tree.nq}  nv {tree.nv}  nu {tree.nu}  digest {tree.digest:016x}"
         )

@@ -3,7 +3,7 @@
 import argparse
 from pathlib import Path
 
-from engram.paths import BUILD, MODELS, TABLES, relative
+from engram.paths import BUILD, MODELS, TABLES, relative, write_changed
 
 EXAMPLES = """examples:
   engram task panda reach             constants of models/panda/reach/, and a scene with collision geoms only
@@ -37,9 +37,9 @@ def run(args: argparse.Namespace) -> int:
     world = args.models / args.robot / args.task / "world.xml"
     folder = args.tables / f"{args.robot}_{args.task}"
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "task.h").write_text(task_header(spec), encoding="utf-8")
+    write_changed(folder / "task.h", task_header(spec))
     scene = scene_mjcf(spec, args.tables / args.robot / "robot.xml", world, folder)
-    (folder / "scene.xml").write_text(scene, encoding="utf-8")
+    write_changed(folder / "scene.xml", scene)
     sizes = f"vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}"
     print(f"task:   {relative(folder)}/task.h scene.xml  {sizes}  digest {spec.digest:016x}")
     if args.meshes:

@@ -1,0 +1,24 @@
+#!/usr/bin/env bash
+# Rebuilds tables/ from models/: robots, tasks, data (solved tasks, kept in build/data and resumed from there), memory.
+# The same models and sources give the same bytes; `git status tables` tells.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+. scripts/common.sh
+engram=.venv/bin/engram
+robots=()
+for description in models/*/robot.toml; do robots+=("$(basename "$(dirname "$description")")"); done
+"$engram" robot "${robots[@]}"
+for description in models/*/*/task.toml; do
+  task=$(basename "$(dirname "$description")") robot=$(basename "$(dirname "$(dirname "$description")")")
+  "$engram" task "$robot" "$task"
+  scripts/setup.sh build
+  "$engram" data "$robot" "$task"
+  "$engram" fit "$robot" "$task"
+  scripts/setup.sh build
+done
+if [ -z "$(git status --porcelain tables)" ]; then
+  say tables "the same bytes as in the tree"
+else
+  say tables "these differ from what is committed:"
+  git status --short tables
+fi
