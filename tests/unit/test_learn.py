@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+from pathlib import Path
+
 import numpy as np
 import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from engram.learn.bow import fit_bow_code
+from engram.emit import write_tables
+from engram.learn.dataset import rotation
 from engram.learn.gpr import fit_gpr, fit_hyperparameters, round_digits
+from engram.learn.memory import Memory, Motions, Settings, features, fit_memory
+from engram.learn.reproducible import PINNED, pinned
 from engram.learn.timebase import TimeBasis
+from engram.learn.trust import Trials, fit_trust, probability
 
 T = 1.5
 TIMES = np.linspace(0, T, 51)
@@ -83,6 +93,73 @@ def test_hyperparameters_find_the_inputs_that_matter() -> None:
     assert np.array_equal(length, again[0]) and noise == again[1]
 
 
-@pytest.mark.parametrize(("value", "rounded"), [(1.23456, 1.23), (0.00098765, 0.000988), (98765.0, 98800.0)])
+@pytest.mark.parametrize(("value", "rounded"), [(1.23456, 1.23), (0.00098765, 0.000988), (98765.0, 98800.0), (0.0, 0.0), (-1.2345, -1.23)])
 def test_rounding_to_digits(value: float, rounded: float) -> None:
     assert round_digits(value) == pytest.approx(rounded, rel=1e-12)
+
+
+SMALL = Settings(gaussians=12, components=6, regression_samples=100, hyperparameter_samples=80, hyperparameter_outputs=2)
+
+
+def arm_memory() -> Memory:
+    """A memory of 150 synthetic motions of seven joints; their bow, up to 1.6 rad, depends on the first joint's start."""
+    rng = np.random.default_rng(4)
+    n = 150
+    start, p_WT = rng.uniform(-1, 1, (n, 7)), rng.uniform(-0.5, 0.5, (n, 3))
+    end = start + np.repeat(p_WT, [2, 2, 3], axis=1)
+    r = TIMES / T
+    s = (10 * r**3 - 15 * r**4 + 6 * r**5)[None, :, None]
+    bow = np.sin(np.pi * s) ** 2 * (0.8 * np.sin(2 * start[:, :1]) * np.linspace(1, 2, 7))[:, None, :]
+    q = (1 - s) * start[:, None] + s * end[:, None] + bow
+    R_WT = rotation(rng.normal(size=(n, 4)))
+    motions = Motions(features(start, p_WT, R_WT), TIMES, q, np.arange(n) % 5 == 4)
+    return fit_memory(motions, SMALL)
+
+
+def test_a_memory_of_smooth_motions_recalls_them() -> None:
+    memory = arm_memory()
+    report = {name: value for name, value, _ in memory.report}
+    assert report["time.rms"] < 2e-3 and report["bow.rms"] < 2e-3  # rad
+    assert report["gpr.rms"] < 0.1  # rad; 100 samples in 17 dimensions, of which it must find the one that matters
+    assert memory.knn.x.shape == (120, 16) and memory.knn.value.shape == (120, 7 + 6) and memory.gpr.x.shape == (100, 17)
+    assert memory.bow.basis.shape == (6, 12 * 7) and memory.time.channels == 7
+
+
+def test_the_same_motions_make_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a", "b"):
+        memory = arm_memory()
+        tables = [memory.knn, memory.gpr, memory.bow, memory.time]
+        write_tables(tmp_path / name, "toy", tables, robot_digest=1, task_digest=2, data_digest="", provenance="")
+    for path in (tmp_path / "a").iterdir():
+        assert path.read_bytes() == (tmp_path / "b" / path.name).read_bytes(), path.name
+
+
+def test_features_are_posture_position_and_two_axes() -> None:
+    R_WT = rotation(np.array([[0.0, 0.0, np.sin(0.25), np.cos(0.25)]]))[0]  # 0.5 rad about z
+    np.testing.assert_allclose(R_WT[:, 0], [np.cos(0.5), np.sin(0.5), 0], atol=1e-15)
+    x = features(np.arange(7.0)[None], np.array([[7.0, 8.0, 9.0]]), R_WT[None])[0]
+    np.testing.assert_allclose(x, [*range(10), 0, 0, 1, np.cos(0.5), np.sin(0.5), 0], atol=1e-15)
+
+
+def test_trust_is_calibrated() -> None:
+    rng = np.random.default_rng(6)
+    n = 6000
+    inputs = np.column_stack([rng.uniform(0, 3, n), np.zeros(n), rng.uniform(0, 1.2, n), np.zeros(n), rng.integers(0, 2, n)])
+    truth = probability(np.array([-1.5, 0, -1.0, 0, -0.5]), 2.5, inputs)
+    table, report = fit_trust(Trials(np.arange(n), inputs, rng.uniform(size=n) < truth))
+    found = probability(table.weight, table.bias, inputs)
+    assert np.abs(found - truth).max() < 0.06  # three standard errors of 6000 trials, at the rarest corner
+    figures = {name: value for name, value, _ in report}
+    assert figures["trust.brier"] < figures["trust.brier_of_base_rate"] and figures["trust.auc"] > 0.7
+
+
+def test_trust_of_guesses_that_all_succeed() -> None:
+    table, report = fit_trust(Trials(np.arange(50), np.zeros((50, 5)), np.ones(50, bool)))
+    assert probability(table.weight, table.bias, np.zeros((1, 5)))[0] == pytest.approx(0.99) and report == [("trust.good", 1.0, "1")]
+
+
+def test_a_process_pins_itself_before_numpy_is_loaded() -> None:
+    code = "from engram.learn.reproducible import restart_pinned, pinned; restart_pinned(); print(pinned())"
+    environment = {key: value for key, value in os.environ.items() if key not in PINNED}
+    done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n" and pinned() == all(os.environ.get(k) == v for k, v in PINNED.items())

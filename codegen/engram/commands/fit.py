@@ -37,7 +37,7 @@ def run(args: argparse.Namespace) -> int:
     from engram.learn.dataset import load_motions
     from engram.learn.figures import write_figures
     from engram.learn.memory import Settings, fit_memory
-    from engram.learn.trials import try_guesses
+    from engram.learn.trials import decoding_loss, try_guesses
     from engram.learn.trust import fit_trust
     from engram.tasks.spec import load_task
 
@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
         provenance=f"engram fit {args.robot} {args.task}; {source.made_from}; {len(motions.x)} motions",
     )
     size = sum(file["bytes"] for file in manifest["files"].values())
-    report = [*memory.report, *trust_report, ("bytes", float(size), "byte")]
+    report = [*memory.report, *decoding_loss(spec, memory, source), *trust_report, ("bytes", float(size), "byte")]
     for key, value, unit in report:
         print(f"fit:    {key:<26} {value:.4g} {unit}")
     write_figures("fit", [(f"fit.{name}.{key}", value, unit, int(motions.held_out.sum())) for key, value, unit in report])

@@ -71,12 +71,21 @@ def triangle(lower: np.ndarray) -> np.ndarray:
     return np.concatenate([square[i, : pad(i + 1)] for i in range(n)])
 
 
+def fnv1a(words: list[int], value: int = FNV_OFFSET) -> int:
+    """FNV-1a over 32-bit words."""
+    for word in words:
+        value = ((value ^ word) * FNV_PRIME) & MASK64
+    return value
+
+
+def words64(number: int) -> list[int]:
+    """A 64-bit number as two words, the lower first."""
+    return [number & 0xFFFFFFFF, number >> 32]
+
+
 def digest(arrays: list[Array]) -> int:
     """FNV-1a over counts and floats as 32-bit words: tab_digest of controller/tab/tab.h."""
     value = FNV_OFFSET
     for item in arrays:
-        count = item.flat.size
-        words = [count & 0xFFFFFFFF, count >> 32, *item.flat.view(np.uint32).tolist()]
-        for word in words:
-            value = ((value ^ word) * FNV_PRIME) & MASK64
+        value = fnv1a([*words64(item.flat.size), *item.flat.view(np.uint32).tolist()], value)
     return value

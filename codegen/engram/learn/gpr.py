@@ -15,7 +15,7 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 def round_digits(value: np.ndarray | float, digits: int = 3) -> np.ndarray | float:
     """Rounded to significant digits: the last bits of an optimiser shall not reach the tables."""
     value = np.asarray(value, float)
-    power = 10.0 ** (digits - 1 - np.floor(np.log10(np.abs(value))))
+    power = 10.0 ** (digits - 1 - np.floor(np.log10(np.where(value == 0, 1.0, np.abs(value)))))
     return np.round(value * power) / power
 
 

@@ -33,3 +33,27 @@ def try_guesses(spec: TaskSpec, memory: Memory, source: Source, tasks: int) -> T
             inputs.append(row)
             good.append(solver.judge(found, vector) == OK)
     return Trials(np.array(number), np.array(inputs), np.array(good))
+
+
+def decoding_loss(spec: TaskSpec, memory: Memory, source: Source) -> list[tuple[str, float, str]]:
+    """What a held-out motion loses by being remembered, between its own ends.
+
+    Its controls come back as the inverse dynamics of its path: their error beside the spread of the solver's own, and the cost
+    of the motion above the solver's.
+    """
+    solver = ReachSolver(spec, 0, SolverSettings())
+    motions = source.motions
+    error, spread, loss = [], [], []
+    for i in np.flatnonzero(motions.held_out):
+        q = motions.q[i : i + 1]
+        path = memory.code.decode(memory.code.encode(motions.t, q), motions.t, q[:, 0], q[:, -1])
+        solver.set(q[0, 0], source.vector[i])
+        xs, us = solver.problem.warp(path, np.ascontiguousarray(q[:, -1]))
+        error.append(us[0] - source.us[i])
+        spread.append(source.us[i] - source.us[i].mean(axis=0))
+        loss.append(solver.problem.merit(xs, us)[0] / source.cost[i] - 1)
+    return [
+        ("us.rms", float(np.sqrt(np.mean(np.square(error)))), "N m"),
+        ("us.spread", float(np.sqrt(np.mean(np.square(spread)))), "N m"),
+        ("decoded.suboptimality", float(np.median(loss)), "1"),
+    ]
