@@ -16,8 +16,8 @@ help:
 setup:
 	@scripts/setup.sh
 
-# The demo needs three programs; the tests and the offline side can wait.
-demo: export TARGETS = engram-controller engram-plant engram-render
+# The demo needs three programs and the binding; the tests can wait.
+demo: export TARGETS = engram-controller engram-plant engram-render _engine
 demo: setup
 	@.venv/bin/engram demo --seed $(SEED) $(ARGS)
 
