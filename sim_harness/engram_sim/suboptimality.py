@@ -39,7 +39,7 @@ def read_jumps(path: Path) -> list[Jump]:
     jumps = []
     for line in lines:
         words = line.split(",")
-        if len(words) >= len(names):
+        if len(words) >= len(names) and int(words[0]) > 0:  # 0: the controller was reset, there is no jump yet
             x0, task = (np.array([float(words[i]) for i in columns[start]]) for start in ("x0_", "task_"))
             merits = np.array([float(word) for word in words[columns["merits"][0] :]])
             jumps.append(Jump(int(words[0]), words[2], x0, task, merits))
@@ -54,7 +54,7 @@ def _start(robot: str, task: str) -> None:
     from engram.data.reach import ReachSolver, Settings
     from engram.tasks.spec import load_task
 
-    _solver = ReachSolver(load_task(robot, task), 0, Settings())
+    _solver = ReachSolver(load_task(robot, task), 0, Settings(lines=3, detours=1, iterations=100))
 
 
 def best_cost(x0: np.ndarray, task: np.ndarray) -> float:
