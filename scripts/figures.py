@@ -60,7 +60,7 @@ def table(records: list[Record]) -> str:
     heads = {"id": "figure", "value": "value", "unit": "unit", "n": "trials", "peer": "peer", "ratio": "peer / ours"}
     rows = ["| " + " | ".join(heads[key] for key in columns) + " |", "|" + "---|" * len(columns)]
     for record in records:
-        share = ".success." in record["id"]
+        share = ".success" in record["id"]
         cells = {
             "id": f"`{record['id']}`",
             "value": number(record["value"], share),

@@ -94,13 +94,9 @@ pip_install() {
 
 setup_build() {
   configure build Release
-  local targets=(${TARGETS:-all})
-  if ninja -C build -n "${targets[@]}" 2> /dev/null | grep -q 'no work to do'; then
-    say build "build/ is up to date"
-  else
-    say build "compiling into build/ (minutes the first time, seconds after that)"
-    compile build "${targets[@]}"
-  fi
+  say build "building into build/ (minutes the first time, seconds after that)"
+  # shellcheck disable=SC2086: a list of targets
+  compile build ${TARGETS:-all}
 }
 
 # The renderer's scenes: meshes of the robot and the world around it, from models/ into build/.
