@@ -36,6 +36,8 @@ struct Counting {
 inline Counting select(bool mask, Counting a, Counting b) { return mask ? a : b; }
 inline int64_t to_bits(Counting a) { return to_bits(a.value); }
 inline Counting madd(Counting a, Counting b, Counting c) { return Counting::counted(madd(a.value, b.value, c.value), 2); }
+inline Counting nmadd(Counting a, Counting b, Counting c) { return madd(-a, b, c); }
+inline Counting msub(Counting a, Counting b, Counting c) { return madd(a, b, -c); }
 inline Counting sqrt(Counting a) { return Counting::counted(sqrt(a.value)); }
 inline Counting abs(Counting a) { return Counting(abs(a.value)); }
 inline double lane(Counting a, int) { return a.value; }

@@ -1,6 +1,6 @@
 """Write a robot model as plain text, for the peers' C++ programs: `export_models.py OUT_DIR ROBOT...`.
 
-One number after the other, 17 digits: the peer computes with exactly the numbers of the URDF, without a URDF parser.
+One number after the other, 17 digits: the peer computes with exactly our numbers, without a URDF parser.
 """
 
 from __future__ import annotations
@@ -8,22 +8,17 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-import example_robot_data
 import numpy as np
 import pinocchio as pin
 
+from engram.robots.tree import load as load_tree
+from engram.robots.tree import q_to_pin
+
 
 def load(name: str) -> tuple[pin.Model, np.ndarray]:
-    """Model and reference posture of a benchmark robot."""
-    if name == "panda":  # the fingers are locked at the reference posture
-        model = example_robot_data.load("panda").model
-        q_ref = model.referenceConfigurations["default"]
-        fingers = [model.getJointId(f"panda_finger_joint{i}") for i in (1, 2)]
-        return pin.buildReducedModel(model, fingers, q_ref), q_ref[:7]
-    if name == "talos":
-        model = example_robot_data.load("talos").model
-        return model, model.referenceConfigurations["half_sitting"]
-    raise ValueError(f"unknown robot {name!r}")
+    """The model that models/<name>/robot.toml makes, from which our constants are written too, and its nominal posture."""
+    tree = load_tree(name)
+    return tree.model, q_to_pin(tree, tree.q_home)
 
 
 def numbers(*arrays: object) -> str:

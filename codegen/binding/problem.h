@@ -3,6 +3,7 @@
 #define CODEGEN_BINDING_PROBLEM_H_
 
 #include "codegen/binding/arrays.h"
+#include "codegen/offline/dense_model.h"
 #include "codegen/offline/ipopt_shooting.h"
 #include "controller/fddp/fddp_solve.h"
 #include "controller/loop/loop_merit.h"
@@ -79,11 +80,10 @@ template <class P_, int N_> class Problem {
       unpad(m.Lz, nz, Lz.row(k));
       unpad(w().f[k], ndx, gap.row(k));
       for (int i = 0; i < nz; ++i)
-        for (int j = 0; j < nz; ++j)
-          Lzz.row(k)[i * nz + j] = m.Lzz[padded_index<L>(std::max(i, j))][padded_index<L>(std::min(i, j))];
+        for (int j = 0; j < nz; ++j) Lzz.row(k)[i * nz + j] = offline::dense_hessian(m, i, j);
       if (k == T) break;
       for (int i = 0; i < nv; ++i) unpad(m.D[i], nz, D.row(k) + i * nz);
-      dense(m, h().knot[k].dt, Fx.row(k), Fu.row(k));
+      offline::dense_dynamics<P>(m, h().knot[k].dt, Fx.row(k), Fu.row(k));
     }
     nb::dict result;
     result["cost"] = w().cost;
@@ -226,31 +226,6 @@ template <class P_, int N_> class Problem {
 
   static void unpad(const double* padded, int n, double* out) {
     for (int i = 0; i < n; ++i) out[i] = padded[padded_index<L>(i)];
-  }
-
-  // Fx = [E 0; 0 0] + [dt G; I] Dx,   Fu = [dt G; I] Du
-  template <class Model> static void dense(const Model& m, double dt, double* Fx, double* Fu) {
-    const auto E = [&m](int i, int j) -> double {
-      if constexpr (P::kFreeBase)
-        if (i < 6 && j < 6) return m.E[i][j];
-      return i == j;
-    };
-    const auto G = [&m](int i, int j) -> double {
-      if constexpr (P::kFreeBase)
-        if (i < 6 && j < 6) return m.G[i][j];
-      return i == j;
-    };
-    for (int j = 0; j < nz; ++j)
-      for (int i = 0; i < ndx; ++i) {
-        double sum = 0.0;
-        if (i < nv) {
-          for (int l = 0; l < nv; ++l) sum += G(i, l) * m.D[l][padded_index<L>(j)];
-          sum = dt * sum + (j < nv ? E(i, j) : 0.0);
-        } else {
-          sum = m.D[i - nv][padded_index<L>(j)];
-        }
-        (j < ndx ? Fx[i * ndx + j] : Fu[i * nu + j - ndx]) = sum;
-      }
   }
 
   Out gains() {
