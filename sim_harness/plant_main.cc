@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 #include <cstring>
 #include <ctime>
 
@@ -25,7 +26,9 @@ namespace {
 
 constexpr int kTaskRepeat = 500;  // steps; on the wall clock the task is repeated for a controller that starts late
 
-enum ExitCode { kOk = 0, kBadInput = 2, kLogTruncated = 3, kNoController = 4, kUsage = 64 };
+enum ExitCode { kOk = 0, kBadInput = 2, kLogTruncated = 3, kNoController = 4, kDiverged = 5, kStopped = 130 };
+
+volatile std::sig_atomic_t stopped = 0;  // by SIGINT or SIGTERM: the log is closed and the results are written
 
 struct PlantOptions {
   std::string scene, series, log, results, timing, clock = "lockstep",
@@ -44,7 +47,8 @@ struct PlantOptions {
 constexpr char kAbout[] =
     "engram-plant: simulates the robot of a scene in MuJoCo (1 kHz, torque control) and talks LCM:\n"
     "state_t and task_t out, command_t, cycle_t and timing_t in. Runs and judges a series of reach tasks.\n"
-    "Exit code: 0 done, 2 bad input, 3 done but the log is cut short, 4 no controller answers, 64 wrong option.";
+    "Exit code: 0 done, 2 bad input, 3 done but the log is cut short, 4 no controller answers, 5 the simulation diverged,\n"
+    "64 wrong option, 130 stopped by a signal.";
 
 PlantOptions read_options(int argc, char** argv) {
   PlantOptions o;
@@ -60,7 +64,7 @@ PlantOptions read_options(int argc, char** argv) {
        {"--log-every", "N", "after that, log each N-th state and command; default 10", &o.log_every},
        {"--timing", "FILE", "CSV of the controller's CPU times", &o.timing},
        {"--results", "FILE", "JSON: how each jump ended, and counts", &o.results},
-       {"--give-up", "S", "lock step: end if no command comes for this long; default 10", &o.give_up},
+       {"--give-up", "S", "end if no command comes for this long (wall clock: no first one); default 10", &o.give_up},
        {"--resend-ms", "MS", "lock step: send the state again after this long; default 250", &o.resend_ms},
        {"--stale-ms", "MS", "wall clock: brake if the last command is older than this; default 20", &o.stale_ms},
        {"--damping", "D", "wall clock: joint damping while braking (N m s/rad); default 2", &o.damping},
@@ -91,7 +95,8 @@ class Plant {
 
  private:
   void begin_step();
-  bool answer_step();
+  bool wait_for_command();
+  ExitCode answer_step();
   void brake(double* tau) const;
   bool finished() const;
 
@@ -186,20 +191,26 @@ void Plant::brake(double* tau) const {
   for (int i = 0; i < model_.nu; ++i) tau[i] = -o_.damping * model_.d->qvel[model_.nv - model_.nu + i];
 }
 
-bool Plant::answer_step() {
-  double tau[kMaxDof] = {};
-  if (lock_step_) {
-    for (double waited = 0; !link_.wait_answer(o_.resend_ms); link_.resend()) {
-      waited += 1e-3 * o_.resend_ms;
-      if (waited >= o_.give_up) {
-        std::fprintf(stderr,
-                     "engram-plant: no command on ENGRAM_COMMAND for %.1f s at t = %.3f s (%lld messages refused); start "
-                     "engram-controller "
-                     "with --lcm-url '%s', or see its last message\n",
-                     waited, t_, static_cast<long long>(link_.refused().total()), o_.url.c_str());
-        return false;
-      }
+// Waits for the command that answers the current state; says what to do if none comes.
+bool Plant::wait_for_command() {
+  for (double waited = 0; !stopped && !link_.wait_answer(o_.resend_ms); link_.resend()) {
+    waited += 1e-3 * o_.resend_ms;
+    if (waited >= o_.give_up) {
+      std::fprintf(stderr,
+                   "engram-plant: no command on ENGRAM_COMMAND for %.1f s at t = %.3f s (%lld messages refused); start "
+                   "engram-controller with --lcm-url '%s', or see its last message\n",
+                   waited, t_, static_cast<long long>(link_.refused().total()), o_.url.c_str());
+      return false;
     }
+  }
+  return true;
+}
+
+// Takes the command and moves the world by one step. On the wall clock, too, the first command is waited for.
+ExitCode Plant::answer_step() {
+  double tau[kMaxDof] = {};
+  if (lock_step_ || steps_ == 1) {
+    if (!wait_for_command()) return kNoController;
     std::memcpy(tau, link_.command().tau, sizeof tau);
   } else {
     link_.drain();
@@ -218,31 +229,38 @@ bool Plant::answer_step() {
   judge_.command(model_.torque_share(), link_.command().status);
   faults_.push(&model_, t_);
   mj_step2(model_.m, model_.d);
+  for (const int warning : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL}) {
+    if (model_.d->warning[warning].number > 0) {  // MuJoCo has reset the robot, or let go of it
+      std::fprintf(stderr, "engram-plant: the simulation diverged at t = %.3f s; the last commands in the log tell why\n", t_);
+      return kDiverged;
+    }
+  }
   utime_ += step_us_;
   t_ = 1e-6 * static_cast<double>(utime_);
-  return true;
+  return kOk;
 }
 
 ExitCode Plant::run() {
   using Clock = std::chrono::steady_clock;
   const auto start = Clock::now();
   timespec next{};
-  clock_gettime(CLOCK_MONOTONIC, &next);
-  bool alive = true;
-  while (alive && !finished()) {
+  ExitCode code = kOk;
+  while (code == kOk && !stopped && !finished()) {
     begin_step();
-    if (!lock_step_) {  // the command that arrives within this step acts on it
+    if (steps_ == 2) clock_gettime(CLOCK_MONOTONIC, &next);
+    if (!lock_step_ && steps_ > 1) {  // the command that arrives within this step acts on it
       next.tv_nsec += 1000 * step_us_;
       next.tv_sec += next.tv_nsec / 1000000000;
       next.tv_nsec %= 1000000000;
       clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &next, nullptr);
     }
-    alive = answer_step();
+    code = answer_step();
   }
   log_.close();
   const std::string wrong = write_results(std::chrono::duration<double>(Clock::now() - start).count());
   if (!wrong.empty()) std::fprintf(stderr, "engram-plant: %s\n", wrong.c_str());
-  if (!alive) return kNoController;
+  if (code != kOk) return code;
+  if (stopped) return kStopped;
   if (log_.truncated() || !wrong.empty()) return kLogTruncated;
   return kOk;
 }
@@ -273,6 +291,8 @@ std::string Plant::write_results(double wall_seconds) const {
 
 int plant_main(int argc, char** argv) {
   install_mujoco_handlers("engram-plant");
+  std::signal(SIGINT, [](int) { stopped = 1; });
+  std::signal(SIGTERM, [](int) { stopped = 1; });
   Plant plant(read_options(argc, argv));
   const std::string wrong = plant.init();
   if (!wrong.empty()) {

@@ -63,6 +63,7 @@ struct StandIn {
       command.tau[i] = model.m->actuator_ctrllimited[i] ? std::clamp(force[first + i], range[0], range[1]) : force[first + i];
     }
     if (misbehave == 1) command.tau[0] = 0.0 / 0.0;
+    if (misbehave == 3) command.tau[0] = 1e9;
     command.utime = state.utime, command.seq = state.seq, command.robot_digest = state.robot_digest, command.nu = model.nu;
     if (misbehave == 2) ++command.robot_digest;
   }
@@ -109,7 +110,8 @@ int main(int argc, char** argv) {
                  {"--hand", "SITE", "site to steer; default hand_tcp", &hand},
                  {"--lcm-url", "URL", "LCM provider", &url},
                  {"--die-after-ms", "MS", "kill itself at this plant time", &standin.die_after},
-                 {"--misbehave", "KIND", "1: a torque that is not finite; 2: another robot's digest", &standin.misbehave},
+                 {"--misbehave", "KIND", "1: a torque that is not finite; 2: another robot's digest; 3: an absurd torque",
+                  &standin.misbehave},
                  {"--clock", "CLOCK", "accepted, as by the real one", &unused},
                  {"--memory", "MODE", "accepted", &unused},
                  {"--jumps", "FILE", "accepted", &unused}});

@@ -18,7 +18,7 @@ from conftest import ARM, JUMPS, SERIES, Arena
 from engram_sim import eventlog
 from engram_sim.pair import program
 
-BAD_INPUT, LOG_TRUNCATED, NO_CONTROLLER, USAGE = 2, 3, 4, 64  # exit codes of engram-plant
+BAD_INPUT, LOG_TRUNCATED, NO_CONTROLLER, DIVERGED, USAGE, STOPPED = 2, 3, 4, 5, 64, 130  # exit codes of engram-plant
 
 
 def run_log(arena: Arena, name: str, *options: str, controller_options: tuple[str, ...] = ()) -> bytes:
@@ -295,11 +295,35 @@ def test_latency_holds_against_gravity_first(arena: Arena) -> None:
     assert np.abs(v).max() < 1e-9  # exact but for rounding: tau = bias cancels it
 
 
-def test_wall_clock_runs_in_real_time_and_brakes_without_a_controller(arena: Arena) -> None:
+def test_wall_clock_waits_for_a_controller_and_brakes_when_it_dies(arena: Arena) -> None:
+    done = arena.plant("--clock", "wall", "--give-up", "0.3")
+    assert done.returncode == NO_CONTROLLER and done.stderr.count("\n") == 1
+    arena.controller("--die-after-ms", "300")
     start = time.monotonic()
-    done = arena.plant("--clock", "wall", "--duration", "0.5")
-    assert done.returncode == 0 and time.monotonic() - start > 0.5
-    assert arena.results()["stale_steps"] > 400 and done.stderr.count("braked") == 1
+    done = arena.plant("--clock", "wall", "--duration", "1.5", "--stale-ms", "100")
+    assert done.returncode == 0 and time.monotonic() - start > 1.5
+    assert arena.results()["stale_steps"] > 900 and done.stderr.count("braked") == 1
+    v = eventlog.read(arena.folder / "run.lcm", ["ENGRAM_STATE"])["ENGRAM_STATE"]["v"].astype(float)
+    assert np.isfinite(v).all() and np.abs(v[-1]).max() < 5.0  # sinks, damped, and does not whirl
+
+
+def test_divergence_is_told(arena: Arena) -> None:
+    unlimited = arena.folder / "unlimited.xml"
+    unlimited.write_text(ARM.read_text().replace('<motor ctrllimited="true" ctrlrange="-87 87"/>', ""))
+    arena.controller("--misbehave", "3")
+    done = arena.plant("--scene", unlimited)
+    assert done.returncode == DIVERGED and "the simulation diverged at t = 0.0" in done.stderr
+
+
+def test_stopped_by_a_signal_it_leaves_whole_files(arena: Arena) -> None:
+    arena.controller()
+    plant = subprocess.Popen(arena.plant_call("--clock", "wall", "--stale-ms", "500"))
+    time.sleep(1.0)
+    plant.terminate()
+    assert plant.wait(10) == STOPPED
+    steps = arena.results()["steps"]
+    assert steps > 100
+    assert len(eventlog.read(arena.folder / "run.lcm", ["ENGRAM_STATE"])["ENGRAM_STATE"]) == steps
 
 
 def test_wall_clock_follows_a_controller(arena: Arena) -> None:
