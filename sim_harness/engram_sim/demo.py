@@ -46,7 +46,7 @@ def demo(args: argparse.Namespace) -> int:
     runs = [read_run(mode, folder / mode) for mode in done]
     spec = load_task(args.robot, args.task)
     header = {"robot": args.robot, "task": args.task, "seed": args.seed, "jumps": args.jumps, "clock": args.clock}
-    header |= {"window_s": spec.success["time"], "tolerance_m": spec.success["position"]}
+    header |= {"video_s": args.video, "window_s": spec.success["time"], "tolerance_m": spec.success["position"]}
     drawn = None
     if args.video > 0:
         drawn = video.render(
@@ -116,7 +116,7 @@ def finish(
     motions = [Motion(run, spec.robot, spec.frame) for run in runs]
     page = report.write(folder, runs, motions, summary, curves, drawn)
     if drawn:
-        video.still(drawn, folder / "demo.png", 1.2)
+        video.still(drawn, folder / "demo.png", video.telling_second(runs, header["video_s"]))
     print_summary(summary)
     print(f"report  {relative(page)}")
     if drawn:

@@ -11,6 +11,7 @@ from engram_sim.pair import Progress, program, stop
 from engram_sim.results import Run
 
 AFTER = 0.6  # s that a clip goes on after its last panel has ended
+BEFORE_END = 0.2  # s before the end of a clip that its picture is taken: outcomes are shown
 OPENING = 4  # jumps from the start of the run: nothing chosen about them
 FRAME_LINE = re.compile(r"frame (\d+)/(\d+)")
 TITLES = {"memory": "memory", "line": "straight line", "shift": "shifted plan", "cold": "cold start"}
@@ -126,6 +127,19 @@ def join(pieces: list[Path], out: Path) -> None:
     listing.unlink()
     for piece in pieces:
         piece.unlink()
+
+
+def telling_second(runs: list[Run], seconds: float) -> float:
+    """When `render` shows the end of its first jump that some modes solve and some do not (else of its first clip)."""
+    first, start = 0.0, 0.0
+    for _, n, move in choose(runs, seconds):
+        jumps = [next(jump for jump in run.jumps if jump["jump"] == n) for run in runs]
+        end = start + duration(jumps, move)
+        first = first or end
+        if not move and len({jump["success"] for jump in jumps}) > 1:
+            return end - BEFORE_END
+        start = end
+    return first - BEFORE_END
 
 
 def still(video: Path, out: Path, second: float) -> None:
