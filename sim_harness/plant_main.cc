@@ -5,8 +5,6 @@
 //   mj_step1: positions, velocities, contacts of time t; judge them; write the log      -- while the controller computes
 //   lock step: wait for the command that answers this state;  wall clock: take the latest one
 //   mj_step2: apply tau, integrate to t + 1 ms
-#include <unistd.h>
-
 #include <algorithm>
 #include <chrono>
 #include <csignal>
@@ -31,8 +29,9 @@ enum ExitCode { kOk = 0, kBadInput = 2, kLogTruncated = 3, kNoController = 4, kD
 volatile std::sig_atomic_t stopped = 0;  // by SIGINT or SIGTERM: the log is closed and the results are written
 
 struct PlantOptions {
-  std::string scene, series, log, results, timing, clock = "lockstep",
-                                                   url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4000000";
+  std::string scene, series, log, results, timing;
+  std::string clock = "lockstep";
+  std::string url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4000000";
   double duration = 0;    // s; 0: until the series ends
   double log_full = 1e9;  // s
   int log_every = 10;     // steps
@@ -159,6 +158,7 @@ void Plant::begin_step() {
   if (event.reset) {
     const double rest[kMaxDof] = {};
     state_.seq = 0;
+    faults_.restart();
     mj_resetData(model_.m, model_.d);
     model_.set_state(event.reset->q.data(), rest);
   }
@@ -186,7 +186,7 @@ void Plant::begin_step() {
   }
 }
 
-// tau = tau_gravity-free damping: -D v of the driven joints
+// tau = -D v of the driven joints
 void Plant::brake(double* tau) const {
   for (int i = 0; i < model_.nu; ++i) tau[i] = -o_.damping * model_.d->qvel[model_.nv - model_.nu + i];
 }
@@ -274,9 +274,8 @@ std::string Plant::write_results(double wall_seconds) const {
                o_.clock.c_str(), static_cast<long long>(steps_), t_, wall_seconds);
   std::fprintf(file, "  \"robot_digest\": \"0x%016llx\",\n  \"task_digest\": \"0x%016llx\",\n",
                static_cast<unsigned long long>(state_.robot_digest), static_cast<unsigned long long>(task_.task_digest));
-  std::fprintf(file, "  \"log\": {\"path\": \"%s\", \"events\": %lld, \"bytes\": %lld, \"truncated\": %s},\n",
-               log_.path().c_str(), static_cast<long long>(log_.events()), static_cast<long long>(log_.bytes()),
-               log_.truncated() ? "true" : "false");
+  std::fprintf(file, "  \"log\": {\"events\": %lld, \"bytes\": %lld, \"truncated\": %s},\n",
+               static_cast<long long>(log_.events()), static_cast<long long>(log_.bytes()), log_.truncated() ? "true" : "false");
   std::fprintf(file,
                "  \"refused\": {\"malformed\": %lld, \"foreign_robot\": %lld, \"not_finite\": %lld, \"second_answer\": %lld},\n"
                "  \"resends\": %lld,\n  \"stale_steps\": %lld,\n  \"jumps\": ",

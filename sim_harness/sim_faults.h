@@ -38,6 +38,8 @@ class Faults {
   void measure(const Model& model, double* q, double* v);
   // Takes the command of this step and returns the one that acts now. The first `latency` steps hold against gravity.
   const double* delay(const Model& model, const double* tau);
+  // The robot was put elsewhere: commands under way are of no use any more.
+  void restart() { queue_.clear(); }
   // Sets the external forces of time t.
   void push(Model* model, double t);
 

@@ -33,7 +33,6 @@ class EventLog {
   bool truncated() const { return truncated_; }
   int64_t events() const { return events_; }
   int64_t bytes() const { return bytes_; }
-  const std::string& path() const { return path_; }
 
  private:
   struct Event {
