@@ -7,11 +7,10 @@
 //   engram_bench gemm N                        GFLOP/s of Eigen's fixed-size double product under our flags
 //
 // Same input, same output, same order of entries as the programs of bench/peers. Writes one JSON object.
-#include "bench/counting.h"
 #include "bench/gemm.h"
+#include "bench/problem_bench.h"
 #include "bench/problems.h"
-#include "bench/stopwatch.h"
-#include "controller/fddp/fddp_solve.h"
+#include "bench/whole_body_bench.h"
 #include "controller/rbd/rbd_aba.h"
 #include "controller/rbd/rbd_derivatives.h"
 
@@ -24,174 +23,6 @@ namespace engram::bench {
 namespace {
 
 using ::bench::read_numbers;
-using ::bench::Report;
-using ::bench::sample_us;
-
-constexpr double kStop = 1e-9;
-constexpr int kMaxIterations = 200;
-constexpr double kDisplacement = 1e-3;  // of the first state, in every tangent direction: what one control period sees
-
-[[noreturn]] void fail(const std::string& what) {
-  std::fprintf(stderr, "%s\n", what.c_str());
-  std::exit(1);
-}
-
-// ---- optimal control -----------------------------------------------------------------------------------------------------
-
-constexpr int kMaxKnots = 100;
-
-template <class P> struct Problem {
-  Horizon<P, kMaxKnots> horizon;
-  FddpWork<P, kMaxKnots> work;
-  FddpSolution<P, kMaxKnots> solution;
-  FddpStats stats;
-};
-
-// Blocks of dense derivatives, row by row, as Crocoddyl stores them.
-template <class P> void append_dense(const KnotModel<typename P::Layout, P::kFreeBase, double>& m, double dt, bool terminal,
-                                     double cost, std::vector<double> (&out)[8]) {
-  static_assert(!P::kFreeBase, "E and G are taken as identities");
-  using L = typename P::Layout;
-  auto& [costs, Fx, Fu, Lx, Lu, Lxx, Lxu, Luu] = out;
-  const auto Lzz = [&](int i, int j) {
-    const int a = padded_index<L>(i), b = padded_index<L>(j);
-    return m.Lzz[std::max(a, b)][std::min(a, b)];
-  };
-  costs.push_back(cost);
-  for (int i = 0; i < P::ndx; ++i) {
-    Lx.push_back(m.Lz[padded_index<L>(i)]);
-    for (int j = 0; j < P::ndx; ++j) Lxx.push_back(Lzz(i, j));
-  }
-  if (terminal) return;
-  for (int i = 0; i < P::ndx; ++i) {
-    const double* const D = m.D[i % P::nv];
-    const double step = i < P::nv ? dt : 1.0;  // dq' = dq + dt dv'
-    for (int j = 0; j < P::ndx; ++j) Fx.push_back(step * D[padded_index<L>(j)] + (i < P::nv && i == j));
-    for (int j = 0; j < P::nu; ++j) {
-      Fu.push_back(step * D[L::ou + j]);
-      Lxu.push_back(Lzz(i, P::ndx + j));
-    }
-  }
-  for (int i = 0; i < P::nu; ++i) {
-    Lu.push_back(m.Lz[L::ou + i]);
-    for (int j = 0; j < P::nu; ++j) Luu.push_back(Lzz(P::ndx + i, P::ndx + j));
-  }
-}
-
-// Flops of the Riccati sweep at one knot, from the dimensions of its products (fddp_backward.h); lower triangles only.
-constexpr double backward_flops(int nv, int nu) {
-  const double v = nv, u = nu, x = 2 * v, z = x + u;
-  const double value = 4 * v * v;                                               // (Vqq, Vvq, Vvv) in (dq, dv')
-  const double action = 2 * v * v * z + 2 * v * v * v                           // Vvv D, Dq' (...)
-                        + 2 * v * (z * (z + 1) - v * (v + 1)) / 2 + 4 * v * z;  // rows v and u of D' W; gradients
-  const double gain = u * u * u / 3 + 2 * u * u * x + u * x * (x + 1);          // Cholesky, Y, K, Y'Y
-  return value + action + gain + 2 * u * (u + x);                               // k, Vx
-}
-
-// Flops of the phases over the horizon.
-template <class P> void report_flops(const Problem<P>& problem, Report& report) {
-  const auto& [h, w, s, stats] = problem;
-  using S = Counting;
-  typename P::template Knot<S> knot;
-  constexpr int knot_size = sizeof(typename P::template Knot<double>) / sizeof(double);
-  for (int e = 0; e < knot_size; ++e) reinterpret_cast<S*>(&knot)[e] = reinterpret_cast<const double*>(&h.knot[0])[e];
-  S x[P::nx], u[P::nu], x_next[P::nx], cost;
-  for (int i = 0; i < P::nx; ++i) x[i] = s.x[0][i];
-  for (int i = 0; i < P::nu; ++i) u[i] = s.u[0][i];
-  typename P::template Model<S> model;
-  const double linearize = count_flops([&] { P::linearize(knot, x, u, x_next, cost, model); });
-  const double calc = count_flops([&] { P::calc(knot, x, u, x_next, cost); });
-  const double calc_diff = (h.n + 1) * linearize, backward = h.n * backward_flops(P::nv, P::nu);
-  const double policy = 2.0 * P::nu * (P::ndx + 1) + P::ndx;
-  const double forward = kLanes * h.n * (calc + policy);
-  report.number("flops_calcdiff", calc_diff);
-  report.number("flops_backward", backward);
-  report.number("flops_forward", forward);
-  report.number("flops_solve1", calc_diff + backward + forward);
-}
-
-template <class P> void compare(Problem<P>& problem, const std::vector<double>& trajectory) {
-  using L = typename P::Layout;
-  auto& [h, w, s, stats] = problem;
-  const int n = h.n;
-  if (int(trajectory.size()) != (n + 1) * P::nx + n * P::nu) fail("trajectory of another size");
-  const std::vector<double> x_cold(s.x[0], s.x[0] + (n + 1) * P::nx), u_cold(s.u[0], s.u[0] + n * P::nu);
-  std::copy_n(trajectory.begin(), (n + 1) * P::nx, s.x[0]);
-  std::copy_n(trajectory.begin() + (n + 1) * P::nx, n * P::nu, s.u[0]);
-
-  FddpOpts opts;
-  opts.reg_init = 0.0;
-  fddp_start(opts, w, stats);
-  if (!fddp_linearize(h, s, w) || !fddp_backward(h, opts, w, s)) fail("no direction at this trajectory");
-  std::vector<double> dense[8], gap, K, k;
-  for (int t = 0; t <= n; ++t) {
-    double x_next[P::nx], cost;
-    const double no_control[P::nu] = {};
-    KnotModel<L, P::kFreeBase, double> model;  // one knot by itself: its cost, which the solver only sums
-    P::linearize(h.knot[t], s.x[t], t < n ? s.u[t] : no_control, x_next, cost, model);
-    append_dense<P>(w.model[t], h.knot[t].dt, t == n, cost, dense);
-    for (int i = 0; i < P::ndx; ++i) gap.push_back(w.f[t][padded_index<L>(i)]);
-    for (int i = 0; t < n && i < P::nu; ++i) {
-      k.push_back(w.k[t][i]);
-      for (int j = 0; j < P::ndx; ++j) K.push_back(s.K[t][i][padded_index<L>(j)]);
-    }
-  }
-  Report report;
-  report.list("x0", h.x0, P::nx);
-  const char* const names[] = {"cost", "Fx", "Fu", "Lx", "Lu", "Lxx", "Lxu", "Luu"};
-  for (int i = 0; i < 8; ++i) report.list(names[i], dense[i]);
-  report.list("gap", gap);
-  report.list("K", K);
-  report.list("k", k);
-
-  opts = {};
-  opts.stop = kStop;
-  opts.iterations = kMaxIterations;
-  std::copy(x_cold.begin(), x_cold.end(), s.x[0]);
-  std::copy(u_cold.begin(), u_cold.end(), s.u[0]);
-  report.list("xs_cold", x_cold);
-  report.list("us_cold", u_cold);
-  report.number("converged", fddp_solve(h, opts, w, s, stats) == FddpStatus::kConverged);
-  report.number("iterations", stats.iterations);
-  report.number("cost_converged", s.cost);
-  report_flops(problem, report);
-  report.list("xs_converged", s.x[0], (n + 1) * P::nx);
-  report.list("us_converged", s.u[0], n * P::nu);
-}
-
-template <class P> void time(Problem<P>& problem, int samples) {
-  using L = typename P::Layout;
-  auto& [h, w, s, stats] = problem;
-  FddpOpts opts;
-  opts.stop = kStop;
-  opts.iterations = kMaxIterations;
-  if (fddp_solve(h, opts, w, s, stats) != FddpStatus::kConverged) fail("does not converge");
-  fddp_linearize(h, s, w);
-  fddp_backward(h, opts, w, s);
-
-  Report report;
-  report.list("calcdiff", sample_us(samples, [&] { fddp_linearize(h, s, w); }));
-  report.list("backward", sample_us(samples, [&] { fddp_backward(h, opts, w, s); }));
-  // the step lengths 1, 1/2, 1/4, 1/8 at once; the peer's sample is of one
-  Pack alpha, dv;
-  for (int i = 0; i < kLanes; ++i) alpha.l[i] = 1.0 / (1 << i);
-  report.list("forward", sample_us(samples, [&] { fddp_rollout(h, opts, s, alpha, w, dv); }));
-
-  // one control period: one iteration from the solution, for a first state nearby
-  const auto solution = std::make_unique<FddpSolution<P, kMaxKnots>>(s);
-  double dx[L::nxp] = {}, x0[P::nx];
-  for (int i = 0; i < P::ndx; ++i) dx[padded_index<L>(i)] = kDisplacement;
-  P::integrate(h.x0, dx, x0);
-  std::copy_n(x0, P::nx, h.x0);
-  opts.iterations = 1;
-  opts.stop = 1e-30;
-  report.list("solve1", sample_us(samples, [&] {
-                s = *solution;
-                fddp_solve(h, opts, w, s, stats);
-              }));
-  report.number("solve1_cost", s.cost);
-}
-
 // ---- rigid-body algorithms -----------------------------------------------------------------------------------------------
 
 template <class R> struct Sample { const double *q, *v, *a, *tau; };
@@ -330,8 +161,9 @@ int run(int argc, char** argv) {
     static Problem<Arm> problem;
     arm_horizon(T, robots::Panda::q_home, problem.horizon);
     arm_cold_start(problem.horizon, problem.solution);
-    if (command == "compare") compare(problem, read_numbers(argument(3)));
-    else time(problem, std::atoi(argument(3)));
+    run_problem(problem, command, argument(3));
+  } else if (is_whole_body(what)) {
+    run_whole_body(command, what, argument(3));
   } else if (what == robots::Panda::name) {
     if (command == "compare") compare<robots::Panda>(read_numbers(argument(3)));
     else time<robots::Panda>(read_numbers(argument(3)), std::atoi(argument(4)));

@@ -8,6 +8,9 @@
 #include "controller/ocp/ocp_frame.h"
 #include "controller/ocp/ocp_limits.h"
 #include "controller/ocp/ocp_regularization.h"
+#include "controller/ocp/ocp.h"
+#include "tables/anymal/robot.h"
+#include "tables/hector/robot.h"
 #include "tables/talos/robot.h"
 
 #include <Eigen/QR>
@@ -174,6 +177,156 @@ template <class P, int N> class TalosWalk {
     }
   }
 };
+
+// ---- ANYmal --------------------------------------------------------------------------------------------------------------
+
+using robots::Anymal;
+
+struct AnymalFeet {
+  using Robot = Anymal;
+  static constexpr int n = 4;
+  static constexpr int frame[n] = {Anymal::kLfFoot, Anymal::kRfFoot, Anymal::kLhFoot, Anymal::kRhFoot};
+  static constexpr ContactKind kind[n] = {ContactKind::kPoint, ContactKind::kPoint, ContactKind::kPoint, ContactKind::kPoint};
+  static constexpr double kp = 0.0, kd = 50.0;
+};
+template <int foot> using AnymalFoot = FrameTranslationTerm<Anymal, AnymalFeet::frame[foot]>;
+using AnymalProblem = ContactOcp<AnymalFeet, StateTerm<Anymal>, ControlTerm<Anymal, false>, LimitTerm<Anymal>, ComTerm<Anymal>,
+                                 AnymalFoot<0>, AnymalFoot<1>, AnymalFoot<2>, AnymalFoot<3>, FrictionConeTerm<0>,
+                                 FrictionConeTerm<1>, FrictionConeTerm<2>, FrictionConeTerm<3>>;
+inline constexpr int kTrotKnots = 56;
+
+// Two pairs of steps of a trot, 10 ms knots: 2 knots on four feet, 25 on two, the touch-down, twice; costs of Crocoddyl's example.
+template <int N> class AnymalTrot {
+ public:
+  explicit AnymalTrot(Horizon<AnymalProblem, N>& h) : h_(h) {
+    constexpr int kStand = 2, kSwing = 25;
+    constexpr double kHeight = 0.1, kStride = 0.15;
+    constexpr int pairs[2][2] = {{1, 2}, {0, 3}};  // feet that swing together
+    h = {};
+    h.n = kTrotKnots;
+    for (int i = 0; i < AnymalProblem::nq; ++i) h.x0[i] = Anymal::q_home[i];
+    auto d = std::make_unique<RbdData<Anymal, double>>();
+    rbd_kinematics(h.x0, *d);
+    rbd_subtree_moments(*d);
+    Vec3<double> foot[4], com = rbd_com(*d);
+    Mat3<double> R;
+    com[0] = com[1] = 0.0;
+    for (int f = 0; f < 4; ++f) {
+      rbd_frame_placement(*d, AnymalFeet::frame[f], R, foot[f]);
+      for (int i = 0; i < 2; ++i) com[i] += 0.25 * foot[f][i];
+    }
+    int k = 0;
+    for (int pair = 0; pair < 2; ++pair) {
+      const unsigned swings = 1u << pairs[pair][0] | 1u << pairs[pair][1];
+      const double stride = pair == 0 ? 0.5 * kStride : kStride;
+      for (int i = 0; i < kStand; ++i) in_time(k++, 15u);
+      Vec3<double> target[2];
+      for (int i = 0; i < kSwing; ++i, ++k) {
+        const double phase = kSwing / 2.0, done = double(i + 1) / kSwing;
+        in_time(k, 15u & ~swings);
+        for (int j = 0; j < 2; ++j) {
+          target[j] = foot[pairs[pair][j]];
+          target[j][0] += stride * done;
+          target[j][2] += i < phase ? kHeight * i / phase : kHeight * (1 - (i - phase) / phase);
+          place(k, pairs[pair][j], target[j], kStep * 1e6);
+        }
+        h.knot[k].com_w = kStep * 1e6;
+        for (int j = 0; j < 3; ++j) h.knot[k].com_ref[j] = com[j] + (j == 0 ? 0.5 * stride * done : 0.0);
+      }
+      h.phase[k] = kImpact | swings;
+      weigh_state(h.knot[k], 1e1, 1e1, 1e3, 1e3, 1e3);
+      for (int j = 0; j < 2; ++j) {
+        place(k, pairs[pair][j], target[j], 1e7);
+        foot[pairs[pair][j]][0] += stride;
+      }
+      com[0] += 0.5 * stride;
+      ++k;
+    }
+    in_time(k, 15u);
+  }
+
+ private:
+  using Knot = typename AnymalProblem::template Knot<double>;
+  static constexpr double kStep = 0.01;
+  Horizon<AnymalProblem, N>& h_;
+
+  void weigh_state(Knot& knot, double position, double orientation, double joints, double base_velocity, double joint_velocity) {
+    for (int i = 0; i < AnymalProblem::nx; ++i) knot.state_ref[i] = h_.x0[i];
+    for (int i = 0; i < Anymal::nv; ++i) {
+      knot.state_w[i] = i < 3 ? position : i < 6 ? orientation : joints;
+      knot.state_w[Anymal::nv + i] = i < 6 ? base_velocity : joint_velocity;
+    }
+  }
+  void in_time(int k, unsigned support) {
+    Knot& knot = h_.knot[k];
+    const bool terminal = k == h_.n;
+    const double scale = terminal ? 1.0 : kStep;
+    h_.phase[k] = support;
+    knot.dt = terminal ? 0.0 : kStep;
+    weigh_state(knot, 0.0, scale * 1e1 * (500.0 * 500.0), scale * 1e1 * (0.01 * 0.01), scale * 1e1 * (10.0 * 10.0), scale * 1e1);
+    knot.control_w = terminal ? 0.0 : scale * 1e-1;
+    knot.limit_w_q = knot.limit_w_v = scale * 1e3;
+    cone<0>(knot, support, scale);
+    cone<1>(knot, support, scale);
+    cone<2>(knot, support, scale);
+    cone<3>(knot, support, scale);
+  }
+  template <int foot> static void cone(Knot& knot, unsigned support, double scale) {
+    auto& p = static_cast<typename FrictionConeTerm<foot>::template Param<double>&>(knot);
+    p.friction_w = contact_active(support, foot) ? scale * 1e1 : 0.0;
+    p.friction_mu = 0.7;
+  }
+  template <int foot> static void place(Knot& knot, const Vec3<double>& p, double w) {
+    auto& term = static_cast<typename AnymalFoot<foot>::template Param<double>&>(knot);
+    term.translation_w = w;
+    for (int i = 0; i < 3; ++i) term.translation_p[i] = p[i];
+  }
+  void place(int k, int foot, const Vec3<double>& p, double w) {
+    Knot& knot = h_.knot[k];
+    foot == 0 ? place<0>(knot, p, w) : foot == 1 ? place<1>(knot, p, w) : foot == 2 ? place<2>(knot, p, w) : place<3>(knot, p, w);
+  }
+};
+
+// ---- Hector --------------------------------------------------------------------------------------------------------------
+
+// Four thrusters 0.1525 m from the centre, alternately turning; each pulls along z and twists by 1/66 m of its thrust.
+struct HectorFlyer : robots::Hector {
+  static constexpr int nu = 4;
+  static constexpr double kArm = 0.1525, kTwist = 1e-6 / 6.6e-5;
+  static constexpr double u_max[nu] = {5.0, 5.0, 5.0, 5.0};
+  static constexpr double actuation[6][nu] = {{0, 0, 0, 0},        {0, 0, 0, 0},        {1, 1, 1, 1},
+                                              {0, kArm, 0, -kArm}, {-kArm, 0, kArm, 0}, {-kTwist, kTwist, -kTwist, kTwist}};
+};
+using Hector = Ocp<HectorFlyer, FramePlacementTerm<HectorFlyer, HectorFlyer::kBase>, StateTerm<HectorFlyer>,
+                   ControlTerm<HectorFlyer, false>>;
+inline constexpr int kFlightKnots = 33;
+
+// From rest at the origin to (1, 0, 1), 30 ms knots.
+template <int N> void hector_horizon(Horizon<Hector, N>& h) {
+  constexpr double dt = 3e-2;
+  h = {};
+  h.n = kFlightKnots;
+  h.x0[6] = 1.0;
+  for (int k = 0; k <= h.n; ++k) {
+    auto& knot = h.knot[k];
+    const bool terminal = k == h.n;
+    knot.dt = terminal ? 0.0 : dt;
+    knot.placement_w = terminal ? 3.0 : 1e-2 * dt;
+    knot.placement_p[0] = knot.placement_p[2] = 1.0;
+    for (int i = 0; i < 3; ++i) knot.placement_R[4 * i] = 1.0;
+    for (int i = 0; i < Hector::ndx; ++i) knot.state_w[i] = terminal ? 0.0 : 1e-6 * (i < 3 ? 0.1 : 1e3) * dt;
+    knot.state_ref[6] = 1.0;
+    knot.control_w = terminal ? 0.0 : 1e-6 * dt;
+  }
+}
+
+// Hover at x0.
+template <int N> void hector_cold_start(const Horizon<Hector, N>& h, FddpSolution<Hector, N>& s) {
+  for (int k = 0; k <= h.n; ++k)
+    for (int i = 0; i < Hector::nx; ++i) s.x[k][i] = h.x0[i];
+  for (int k = 0; k < h.n; ++k)
+    for (int i = 0; i < Hector::nu; ++i) s.u[k][i] = total_mass<HectorFlyer>() * -HectorFlyer::gravity[2] / Hector::nu;
+}
 
 }  // namespace engram::bench
 #endif  // BENCH_LEGGED_PROBLEMS_H_

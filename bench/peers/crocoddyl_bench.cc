@@ -39,11 +39,14 @@ std::vector<double> flat_field(const crocoddyl::ShootingProblem& shooting, bool 
 void compare(Problem& problem, const std::vector<double>& trajectory) {
   using Data = crocoddyl::ActionDataAbstract;
   crocoddyl::ShootingProblem& shooting = *problem.shooting;
-  const std::size_t T = shooting.get_T(), nx = shooting.get_nx(), nu = problem.us[0].size();
-  if (trajectory.size() != (T + 1) * nx + T * nu) throw std::runtime_error("trajectory of another size");
+  const std::size_t T = shooting.get_T(), nx = shooting.get_nx();
+  std::size_t size = (T + 1) * nx;
+  for (const auto& u : problem.us) size += u.size();  // none at an impact
+  if (trajectory.size() != size) throw std::runtime_error("trajectory of another size");
   Vectors xs(T + 1), us(T);
-  for (std::size_t t = 0; t <= T; ++t) xs[t] = Eigen::Map<const Eigen::VectorXd>(&trajectory[t * nx], nx);
-  for (std::size_t t = 0; t < T; ++t) us[t] = Eigen::Map<const Eigen::VectorXd>(&trajectory[(T + 1) * nx + t * nu], nu);
+  const double* next = trajectory.data();
+  for (auto& x : xs) x = Eigen::Map<const Eigen::VectorXd>(next, nx), next += nx;
+  for (std::size_t t = 0; t < T; next += us[t++].size()) us[t] = Eigen::Map<const Eigen::VectorXd>(next, problem.us[t].size());
 
   crocoddyl::SolverFDDP solver(problem.shooting);
   solver.setCandidate(xs, us, false);

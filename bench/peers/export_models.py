@@ -38,9 +38,7 @@ def text(name: str, model: pin.Model, q_ref: np.ndarray) -> str:
         kind = joint.shortname()
         axis = joint.extract().axis if "Unaligned" in kind else np.zeros(3)
         body = numbers(inertia.mass, inertia.lever, inertia.inertia)
-        lines.append(
-            f"{model.names[i]} {model.parents[i]} {kind} {numbers(axis)} {placement(model.jointPlacements[i])} {body}"
-        )
+        lines.append(f"{model.names[i]} {model.parents[i]} {kind} {numbers(axis)} {placement(model.jointPlacements[i])} {body}")
     lines.append(str(model.nframes - 1))
     for frame in list(model.frames)[1:]:
         lines.append(f"{frame.name} {frame.parentJoint} {int(frame.type)} {placement(frame.placement)}")

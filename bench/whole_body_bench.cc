@@ -1,0 +1,46 @@
+// talos30t, talos30: one step of Talos with the costs of the thesis and of Crocoddyl's example; talos100: four steps; anymal: a trot;
+// quad33: Hector to a way point.
+#include "bench/whole_body_bench.h"
+
+#include "bench/legged_problems.h"
+#include "bench/problem_bench.h"
+
+namespace engram::bench {
+namespace {
+
+template <class P> void run_talos(int knots, int steps, double length, const std::string& command, const char* argument) {
+  static Problem<P> problem;
+  TalosWalk<P, kMaxKnots>(knots, steps, length, problem.horizon);
+  legged_cold_start(problem.horizon, problem.solution);
+  run_problem(problem, command, argument);
+}
+
+}  // namespace
+
+bool is_whole_body(const std::string& problem) {
+  for (const char* name : {"talos30t", "talos30", "talos100", "anymal", "quad33"})
+    if (problem == name) return true;
+  return false;
+}
+
+void run_whole_body(const std::string& command, const std::string& name, const char* argument) {
+  if (name == "talos30t") {
+    run_talos<TalosThesis>(30, 1, 0.3, command, argument);
+  } else if (name == "talos30") {
+    run_talos<TalosUtils>(30, 1, 0.3, command, argument);
+  } else if (name == "talos100") {
+    run_talos<TalosUtils>(100, 4, 0.2, command, argument);
+  } else if (name == "anymal") {
+    static Problem<AnymalProblem> problem;
+    AnymalTrot<kMaxKnots>{problem.horizon};
+    legged_cold_start(problem.horizon, problem.solution);
+    run_problem(problem, command, argument);
+  } else {
+    static Problem<Hector> problem;
+    hector_horizon(problem.horizon);
+    hector_cold_start(problem.horizon, problem.solution);
+    run_problem(problem, command, argument);
+  }
+}
+
+}  // namespace engram::bench
