@@ -24,8 +24,6 @@ def test_it_asks_for_the_scene(build: Path) -> None:
 def test_it_needs_no_cpp_library(build: Path) -> None:
     """A C program that links the controller does not drag libstdc++ in."""
     needed = subprocess.run(["ldd", build / "bin/panda_in_process"], capture_output=True, text=True, check=True).stdout
-    direct = subprocess.run(
-        ["readelf", "-d", build / "bin/panda_in_process"], capture_output=True, text=True, check=True
-    ).stdout
+    direct = subprocess.run(["readelf", "-d", build / "bin/panda_in_process"], capture_output=True, text=True, check=True).stdout
     assert "libmujoco" in needed
     assert "libstdc++" not in direct

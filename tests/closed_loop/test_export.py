@@ -22,7 +22,9 @@ int main(void) {
 
 def run(*command: object, cwd: Path) -> str:
     """Output of a command that must succeed."""
-    done = subprocess.run([str(c) for c in command], check=False, cwd=cwd, capture_output=True, text=True, stdin=subprocess.DEVNULL)
+    done = subprocess.run(
+        [str(c) for c in command], check=False, cwd=cwd, capture_output=True, text=True, stdin=subprocess.DEVNULL
+    )
     assert done.returncode == 0, done.stdout[-3000:] + done.stderr[-3000:]
     return done.stdout
 

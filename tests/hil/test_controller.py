@@ -26,8 +26,8 @@ class Plant:
 
     def __init__(self, folder: Path, build: Path) -> None:
         sys.path.insert(0, str(build / "lcm"))
-        import lcm
         import engram_msg
+        import lcm
 
         self.msg = engram_msg
         self.folder = folder

@@ -38,9 +38,7 @@ def peer_problem(T: int) -> crocoddyl.ShootingProblem:
     terminal.addCost("goal", goal, 1e3)
 
     def knot(cost, dt):
-        return crocoddyl.IntegratedActionModelEuler(
-            crocoddyl.DifferentialActionModelFreeFwdDynamics(state, actuation, cost), dt
-        )
+        return crocoddyl.IntegratedActionModelEuler(crocoddyl.DifferentialActionModelFreeFwdDynamics(state, actuation, cost), dt)
 
     problem = crocoddyl.ShootingProblem(x0, [knot(running, 0.01)] * T, knot(terminal, 0.0))
     problem.nthreads = 1

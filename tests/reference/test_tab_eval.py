@@ -105,9 +105,7 @@ def test_knn_equals_brute_force(tables: Tables) -> None:
     rng = np.random.default_rng(2)
     queries = rng.uniform(-1.2, 1.2, (QUERIES, D))
     k = 10
-    exact, _ = NearestNeighbors(n_neighbors=k, algorithm="brute").fit(tables.x * tables.scale).kneighbors(
-        queries * tables.scale
-    )
+    exact, _ = NearestNeighbors(n_neighbors=k, algorithm="brute").fit(tables.x * tables.scale).kneighbors(queries * tables.scale)
     tolerance = (D + 2) * ULP + 4 * ULP  # stated bound of the sum, plus rounding of query and samples relative to their size
     outside = 0
     for query, reference in zip(queries, exact):

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from engram.cli import main
 from engram.emit import Knn, Logit, read_folder, write_tables
 from engram.emit.arrays import array, blocks, pad, triangle, unblocks
 from engram.emit.read import faults
@@ -122,3 +123,43 @@ def test_wrong_shapes_and_double_names_are_refused(tmp_path: Path) -> None:
         logit.arrays()
     with pytest.raises(ValueError, match="two tables would be called 'toy_task_knn_v1'"):
         write_tables(tmp_path, NAME, [knn, knn], robot_digest=0, task_digest=0, data_digest="", provenance="")
+
+
+def engram(*args: object) -> int:
+    """Exit code of `engram <args>`."""
+    return main([str(arg) for arg in args])
+
+
+def test_table_info_and_check(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    write(tmp_path)
+    assert engram("table", "info", tmp_path) == 0
+    text = capsys.readouterr().out
+    assert f"{NAME}_knn_v1" in text and "held-out error 0.1 [m] on 7" in text and "engram fit toy" in text
+    assert engram("table", "check", tmp_path) == 0
+    source = tmp_path / f"{NAME}_logit_v1.c"
+    source.write_text(source.read_text().replace(c_float(1.5), c_float(1.25)))
+    assert engram("table", "check", tmp_path) == 1
+    text = capsys.readouterr().out
+    assert "differs from the manifest" in text and "the data's digest is" in text and "run 'make tables'" in text
+
+
+def test_table_diff_names_what_changed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    write(tmp_path / "a")
+    write(tmp_path / "b")
+    assert engram("table", "diff", tmp_path / "a", tmp_path / "b") == 0
+    knn, _ = tables()
+    knn.value[3, 2] += 0.5
+    write_tables(tmp_path / "b", NAME, [knn], robot_digest=1, task_digest=2, data_digest="d", provenance="engram fit toy")
+    capsys.readouterr()
+    assert engram("table", "diff", tmp_path / "a", tmp_path / "b") == 1
+    text = capsys.readouterr().out
+    assert "knn_v1.value: 1 of 240 differ, by at most 0.5" in text and "logit_v1: only in" in text
+
+
+def test_table_without_a_folder_names_the_mend(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert engram("table", "info", tmp_path / "nowhere") == 2
+    assert "holds no MANIFEST.json" in capsys.readouterr().err
+
+
+def test_committed_tables_are_whole(capsys: pytest.CaptureFixture) -> None:
+    assert engram("table", "check") == 0, capsys.readouterr().out

@@ -12,8 +12,8 @@ import pytest
 from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
-from engram.learn.bow import fit_bow_code
 from engram.emit import write_tables
+from engram.learn.bow import fit_bow_code
 from engram.learn.dataset import rotation
 from engram.learn.gpr import fit_gpr, fit_hyperparameters, round_digits
 from engram.learn.memory import Memory, Motions, Settings, features, fit_memory
@@ -60,7 +60,9 @@ def test_a_bow_decodes_to_its_motion_and_vanishes_at_the_ends() -> None:
 
 def test_more_components_never_fit_worse() -> None:
     rng = np.random.default_rng(3)
-    q = minimum_jerk(100)[1] + 0.2 * np.sin(np.pi * np.outer(rng.uniform(1, 4, 100), TIMES))[:, :, None] * rng.normal(size=(100, 1, 2))
+    q = minimum_jerk(100)[1] + 0.2 * np.sin(np.pi * np.outer(rng.uniform(1, 4, 100), TIMES))[:, :, None] * rng.normal(
+        size=(100, 1, 2)
+    )
     errors = []
     for m in (2, 4, 8, 16):
         code = fit_bow_code(TIME, TIMES, q, m)
@@ -93,7 +95,9 @@ def test_hyperparameters_find_the_inputs_that_matter() -> None:
     assert np.array_equal(length, again[0]) and noise == again[1]
 
 
-@pytest.mark.parametrize(("value", "rounded"), [(1.23456, 1.23), (0.00098765, 0.000988), (98765.0, 98800.0), (0.0, 0.0), (-1.2345, -1.23)])
+@pytest.mark.parametrize(
+    ("value", "rounded"), [(1.23456, 1.23), (0.00098765, 0.000988), (98765.0, 98800.0), (0.0, 0.0), (-1.2345, -1.23)]
+)
 def test_rounding_to_digits(value: float, rounded: float) -> None:
     assert round_digits(value) == pytest.approx(rounded, rel=1e-12)
 
@@ -155,7 +159,9 @@ def test_trust_is_calibrated() -> None:
 
 def test_trust_of_guesses_that_all_succeed() -> None:
     table, report = fit_trust(Trials(np.arange(50), np.zeros((50, 5)), np.ones(50, bool)))
-    assert probability(table.weight, table.bias, np.zeros((1, 5)))[0] == pytest.approx(0.99) and report == [("trust.good", 1.0, "1")]
+    assert probability(table.weight, table.bias, np.zeros((1, 5)))[0] == pytest.approx(0.99) and report == [
+        ("trust.good", 1.0, "1")
+    ]
 
 
 def test_a_process_pins_itself_before_numpy_is_loaded() -> None:

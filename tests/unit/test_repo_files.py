@@ -88,3 +88,9 @@ def test_python_passes_the_linter(root: Path) -> None:
     ruff = subprocess.run([sys.executable, "-m", "ruff", "check", "--no-cache", "--quiet", "."], cwd=root, check=False,
                           capture_output=True, text=True)  # fmt: skip
     assert ruff.returncode == 0, ruff.stdout + ruff.stderr
+
+
+def test_python_is_formatted(root: Path) -> None:
+    ruff = subprocess.run([sys.executable, "-m", "ruff", "format", "--no-cache", "--diff", "."], cwd=root, check=False,
+                          capture_output=True, text=True)  # fmt: skip
+    assert ruff.returncode == 0, ruff.stdout + "\nmend: .venv/bin/ruff format ."

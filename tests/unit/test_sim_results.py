@@ -52,7 +52,9 @@ def test_csv_without_its_last_line(tmp_path: Path) -> None:
 
 def test_jumps_csv(tmp_path: Path) -> None:
     path = tmp_path / "jumps.csv"
-    path.write_text("jump,utime,winner,x0_0,x0_1,task_0,merits\n1,10,knn,0.5,0,2,9,3,1\n2,20,line,1,0,4,8\n0,0,cold,0,0,0,0\n3,30,line,1,")
+    path.write_text(
+        "jump,utime,winner,x0_0,x0_1,task_0,merits\n1,10,knn,0.5,0,2,9,3,1\n2,20,line,1,0,4,8\n0,0,cold,0,0,0,0\n3,30,line,1,"
+    )
     first, second = read_jumps(path)
     assert (first.jump, first.winner, first.x0.tolist(), first.task.tolist()) == (1, "knn", [0.5, 0.0], [2.0])
     assert first.merits.tolist() == [9, 3, 1] and second.merits.tolist() == [8]

@@ -23,7 +23,9 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("task", help="folder of models/<robot>/ that holds a task.toml")
     parser.add_argument("--data", type=Path, help="solved motions (default: build/data/<robot>_<task>.npz)")
     parser.add_argument("--out", type=Path, default=TABLES, help="where the tables' folder is (default: tables/)")
-    parser.add_argument("--trials", type=int, default=TRIALS, help=f"held-out tasks on which guesses are tried (default: {TRIALS})")
+    parser.add_argument(
+        "--trials", type=int, default=TRIALS, help=f"held-out tasks on which guesses are tried (default: {TRIALS})"
+    )
     return parser
 
 

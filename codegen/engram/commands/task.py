@@ -16,9 +16,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser = subparsers.add_parser("task", help=__doc__, description=__doc__, epilog=EXAMPLES)
     parser.add_argument("robot", help="folder of models/ that holds a robot.toml")
     parser.add_argument("task", help="folder of models/<robot>/ that holds a task.toml and a world.xml")
-    parser.add_argument(
-        "--meshes", action="store_true", help="also write the meshes and the scene that shows them"
-    )
+    parser.add_argument("--meshes", action="store_true", help="also write the meshes and the scene that shows them")
     parser.add_argument("--models", type=Path, default=MODELS, help="where robots are described (default: models/)")
     parser.add_argument("--tables", type=Path, default=TABLES, help="where to write (default: tables/)")
     parser.add_argument("--build", type=Path, default=BUILD, help="where to write meshes and the shown scene (default: build/)")

@@ -12,7 +12,7 @@ from engram.emit.arrays import Array, array, blocks, pad, padded_rows, triangle
 
 @dataclass(kw_only=True)
 class Table(ABC):
-    """What all kinds have in common (TabHead). `lo`, `hi`: domain; `inputs`: (name, unit) per input; `role`: what it is called."""
+    """What all kinds have in common (TabHead). `lo`, `hi`: domain; `inputs`: (name, unit) of each; `role`: what it is called."""
 
     inputs: list[tuple[str, str]]
     lo: np.ndarray

@@ -73,9 +73,7 @@ def read_table(folder: Path, entry: dict) -> TableFile:
     if sorted(order) != sorted(values):
         raise InputError(f"{relative(path)}: its list of arrays does not match its arrays; {MEND}")
     arrays = [Array(name, "", values[name].reshape(1, -1)) for name in order]
-    return TableFile(
-        entry["name"], entry["kind"], number("digest"), number("robot_digest"), number("task_digest"), arrays, entry
-    )
+    return TableFile(entry["name"], entry["kind"], number("digest"), number("robot_digest"), number("task_digest"), arrays, entry)
 
 
 def read_folder(folder: Path) -> tuple[dict, list[TableFile]]:

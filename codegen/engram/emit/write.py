@@ -138,16 +138,18 @@ def write_tables(
         made = render(table, symbol, prefix, robot_digest, task_digest, provenance)
         arrays = table.arrays()
         symbols.append((table, symbol))
-        entries.append({
-            "name": symbol,
-            "kind": table.kind,
-            "digest": f"0x{digest(arrays):016x}",
-            "bytes": 4 * sum(a.flat.size for a in arrays),
-            "sizes": {k: (float(v) if isinstance(v, np.float32) else int(v)) for k, v in table.fields().items()},
-            "held_out_error": float(np.float32(table.held_out_error)),
-            "held_out_text": table.held_out_text,
-            "files": sorted(made),
-        })
+        entries.append(
+            {
+                "name": symbol,
+                "kind": table.kind,
+                "digest": f"0x{digest(arrays):016x}",
+                "bytes": 4 * sum(a.flat.size for a in arrays),
+                "sizes": {k: (float(v) if isinstance(v, np.float32) else int(v)) for k, v in table.fields().items()},
+                "held_out_error": float(np.float32(table.held_out_error)),
+                "held_out_text": table.held_out_text,
+                "files": sorted(made),
+            }
+        )
         files.update(made)
 
     includes = "".join(f'#include "controller/tab/tab_{kind}.h"\n' for kind in sorted({t.kind for t, _ in symbols}))

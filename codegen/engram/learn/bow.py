@@ -2,8 +2,8 @@
 
     q(t) = (1 - s) q(0) + s q(T) + bow(t),   s = 10 r^3 - 15 r^4 + 6 r^5,   r = t / T
 
-The bow vanishes at both ends. As weights of Gaussians over time and after PCA (thesis, chapters 3 and 4) it still does, since that
-is a linear condition: a remembered motion always starts and ends where it should (controller/memory/memory_warp.h).
+The bow vanishes at both ends. As weights of Gaussians over time and after PCA (thesis, chapters 3 and 4) it still does,
+since that is a linear condition: a remembered motion always starts and ends where it should (controller/memory/memory_warp.h).
 """
 
 from __future__ import annotations

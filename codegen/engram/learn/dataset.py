@@ -52,7 +52,9 @@ def load_motions(path: Path, spec: TaskSpec, held_out: int) -> Source:
         raise InputError(f"{relative(path)}: cannot be read ({error}); {mend}") from None
     nq = spec.robot.nq
     if digest != spec.digest:
-        raise InputError(f"{relative(path)}: made for another task: its digest is 0x{digest:016x}, the task is 0x{spec.digest:016x}; {mend}")
+        raise InputError(
+            f"{relative(path)}: made for another task: its digest is 0x{digest:016x}, the task is 0x{spec.digest:016x}; {mend}"
+        )
     if len(X) < FEWEST:
         raise InputError(f"{relative(path)}: holds {len(X)} motions, at least {FEWEST} are needed; {mend}")
     shapes = (X.shape[1] == nq + len(spec.vector_name), xs.shape[1:] == (len(t), nq + spec.robot.nv), us.shape[1] == len(t) - 1)

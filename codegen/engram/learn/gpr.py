@@ -44,7 +44,7 @@ def kernel_matrix(a: np.ndarray, b: np.ndarray, length: np.ndarray, variance: fl
 
 
 def fit_hyperparameters(x: np.ndarray, z: np.ndarray, length: np.ndarray) -> tuple[np.ndarray, float]:
-    """ARD length scales and noise (for unit kernel variance) that maximise the marginal likelihood of z (n, m), z of unit variance."""
+    """ARD length scales and noise (kernel variance 1) of the largest marginal likelihood of z (n, m), z of unit variance."""
     kernel = ConstantKernel(1.0, "fixed") * RBF(length, (1e-1, 1e2)) + WhiteKernel(0.1, (1e-4, 1.0))
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)  # a length scale at its bound means: this input does not matter

@@ -28,7 +28,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Motions:
-    """Solved motions. x (n, nq + 9): start q [rad], target p_WT [m], its z and x axes; t (nt,) [s]; q (n, nt, nq); held_out (n,) bool."""
+    """Solved motions: x (n, nq + 9) start q [rad], target p_WT [m], its z and x axes; t (nt,) [s]; q (n, nt, nq); held_out (n,)."""
 
     x: np.ndarray
     t: np.ndarray
@@ -106,7 +106,9 @@ def fit_memory(motions: Motions, settings: Settings, progress: Callable[[str], N
     ends = bow_features(motions.q[:, 0], end, x[:, nq : nq + 3])
     chosen = np.random.default_rng(settings.seed).permutation(np.flatnonzero(train))[: settings.regression_samples]
     for_fit = chosen[: settings.hyperparameter_samples]
-    length, noise = fit_hyperparameters(ends[for_fit], z[for_fit][:, : settings.hyperparameter_outputs], np.full(ends.shape[1], 2.0))
+    length, noise = fit_hyperparameters(
+        ends[for_fit], z[for_fit][:, : settings.hyperparameter_outputs], np.full(ends.shape[1], 2.0)
+    )
     gpr = fit_gpr(ends[chosen], z[chosen], length, noise)
     mean, variance = gpr.predict(ends[test])
     gpr_error = rms(code.decode(mean, motions.t, motions.q[test][:, 0], end[test]) - motions.q[test])
