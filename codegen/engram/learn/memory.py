@@ -28,7 +28,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Motions:
-    """Solved motions: x (n, nq + 9) start q [rad], target p_WT [m], its z and x axes; t (nt,) [s]; q (n, nt, nq); held_out (n,)."""
+    """Solved: x (n, nq + 9) start q [rad], target p_WT [m], its z and x axes; t (nt,) [s]; q (n, nt, nq); held_out (n,)."""
 
     x: np.ndarray
     t: np.ndarray
