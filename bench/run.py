@@ -56,9 +56,7 @@ RIGID_BODY = ("fk", "rnea", "aba", "crba", "rnea_derivatives", "aba_derivatives"
 
 def run_json(*command: object) -> dict:
     """What a benchmark program prints, on one thread."""
-    done = subprocess.run(
-        [str(c) for c in command], capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"}
-    )
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, env={**os.environ, "OMP_NUM_THREADS": "1"})
     if done.returncode:
         raise SystemExit(f"error: {' '.join(map(str, command))}: {done.stderr.strip()}")
     return json.loads(done.stdout)
@@ -153,8 +151,10 @@ class Figures:
         self.rows: list[dict] = []
 
     def title(self, text: str) -> None:
-        print(f"\n{text}\n  {'us':<22}{'ours min':>11} {'median':>9} {'p99':>9} {'worst':>9}   "
-              f"{'peer min':>9} {'median':>9} {'p99':>9} {'worst':>9}   {'ratio':>6}  {'GFLOP/s':>7}")
+        print(
+            f"\n{text}\n  {'us':<22}{'ours min':>11} {'median':>9} {'p99':>9} {'worst':>9}   "
+            f"{'peer min':>9} {'median':>9} {'p99':>9} {'worst':>9}   {'ratio':>6}  {'GFLOP/s':>7}"
+        )
 
     def add(self, group: str, name: str, ours: Samples, peer: Samples | None, holds: bool, flops: float | None) -> None:
         row = {"id": f"bench.{group}.{name}", "value": ours.median, "unit": "us", "n": len(ours.us), "gate": holds}
@@ -211,9 +211,7 @@ class Bench:
         holds = gate_problem(name, ours, run_json(peer_exe, model, "compare", name, trajectory))
         self.all_hold &= holds
 
-        mine, peer = alternate(
-            self.rounds, [self.ours, "time", name, self.n], [peer_exe, model, "time", name, self.n]
-        )
+        mine, peer = alternate(self.rounds, [self.ours, "time", name, self.n], [peer_exe, model, "time", name, self.n])
         self.figures.title(f"{name}: {T} knots, FDDP beside Crocoddyl 3.2.1 (wheel, SSE2), one thread")
         for phase in PHASES:
             self.figures.add(name, phase, mine[phase], peer[phase], holds, ours.get(f"flops_{phase}"))
@@ -238,9 +236,7 @@ class Bench:
         holds = gate(robot, {name: difference(ours[name], theirs[name]) for name in theirs}, DERIVATIVE_TOLERANCE)
         self.all_hold &= holds
 
-        mine, peer = alternate(
-            self.rounds, [self.ours, "time", robot, file, self.n], [peer_exe, text, "time", file, self.n]
-        )
+        mine, peer = alternate(self.rounds, [self.ours, "time", robot, file, self.n], [peer_exe, text, "time", file, self.n])
         self.figures.title(f"{robot}: beside Pinocchio 4.0 (own build, -march=native), one state after the other, then in lanes")
         for name in RIGID_BODY:
             rivals = [peer[p] for p in (name, f"{name}_world") if p in peer]  # the convention that is faster here
