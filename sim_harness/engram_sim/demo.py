@@ -37,6 +37,11 @@ def demo(args: argparse.Namespace) -> int:
     series = folder / "series.txt"
     moving = write_reach(series, args.robot, args.task, args.seed, args.jumps)
     print(f"series  {args.jumps} jumps, {moving} moving targets, seed {args.seed}: {relative(series)}")
+    spec = load_task(args.robot, args.task)
+    header = {"robot": args.robot, "task": args.task, "seed": args.seed, "jumps": args.jumps, "clock": args.clock}
+    header |= {"video_s": args.video, "window_s": spec.success["time"], "tolerance_m": spec.success["position"]}
+    write_summary(folder, header)  # enough for `engram report`, should this process be stopped
+
     codes = run_modes(args, modes, folder, series)
     done = [mode for mode in MODES if mode in modes and codes[mode] in (0, LOG_TRUNCATED)]
     if not done:
@@ -44,9 +49,6 @@ def demo(args: argparse.Namespace) -> int:
         return 1
 
     runs = [read_run(mode, folder / mode) for mode in done]
-    spec = load_task(args.robot, args.task)
-    header = {"robot": args.robot, "task": args.task, "seed": args.seed, "jumps": args.jumps, "clock": args.clock}
-    header |= {"video_s": args.video, "window_s": spec.success["time"], "tolerance_m": spec.success["position"]}
     drawn = None
     if args.video > 0:
         drawn = video.render(
@@ -107,7 +109,7 @@ def finish(
         if run.mode in curves:
             run.suboptimality = {k: curves[run.mode][:, k] for k in (1, 3)}
     summary = header | {"wall_s": round(seconds, 1), "modes": {run.mode: run.summary() for run in runs}}
-    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
+    write_summary(folder, summary)
     records = figures(header["robot"], runs)
     figures_folder.mkdir(parents=True, exist_ok=True)
     (figures_folder / "demo.json").write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
@@ -126,6 +128,11 @@ def finish(
     for run in runs:
         if run.plant["log"]["truncated"]:
             print(f"demo: the log of {run.mode} is cut short: the disk was full")
+
+
+def write_summary(folder: Path, summary: dict[str, Any]) -> None:
+    """summary.json of a demo."""
+    (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
 
 
 def print_summary(summary: dict[str, Any]) -> None:
@@ -151,7 +158,7 @@ def report_again(folder: Path, figures_folder: Path) -> int:
     folder = folder.resolve()
     header = read_summary(folder)
     drawn = folder / "demo.mp4"
-    finish(folder, read_runs(folder), header, drawn if drawn.is_file() else None, header["wall_s"], figures_folder)
+    finish(folder, read_runs(folder), header, drawn if drawn.is_file() else None, header.get("wall_s", 0.0), figures_folder)
     return 0
 
 
