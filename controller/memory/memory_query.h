@@ -203,9 +203,6 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
         for (int i = 0; u != nullptr && i < nv; ++i) guess.u[k][i] = u[i].l[l];
       }
     });
-    for (int l = 0; l < lanes; ++l) {
-      for (int i = 0; i < nq + nv; ++i) answer.guess[first + l].x[0][i] = x0[i];  // to the last bit
-    }
   }
 }
 

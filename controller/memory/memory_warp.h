@@ -25,11 +25,12 @@ struct Blend {
 //
 //   x0   (nq + nv)  measured state
 //   end  (nq)       posture to arrive at (lanes are guesses)
-//   t    (n + 1)    knot times [s];  T: length of a remembered motion [s]
+//   t    (n + 1)    knot times [s], t[0] = 0;  T: length of a remembered motion [s]
 template <class R, class S, class Path>
 void warp_bow(const double* x0, const S* end, int n, const double* t, double T, Path& path) {
   static_assert(R::nq == R::nv, "a free base needs the warp on its manifold");
-  for (int k = 0; k <= n; ++k) {
+  for (int i = 0; i < R::nq; ++i) path[0][i] = x0[i];  // to the last bit, though the table's bow is rounded to float
+  for (int k = 1; k <= n; ++k) {
     const Blend blend(t[k] / T);
     for (int i = 0; i < R::nq; ++i) {
       path[k][i] += (1 - blend.s) * x0[i] + T * blend.h * x0[R::nq + i] + blend.s * end[i];
