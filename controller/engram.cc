@@ -17,7 +17,7 @@ engram_error check(const engram_model& model, const engram_options& o) {
   const double tick = static_cast<double>(model.about.tick_us);
   if (o.memory < 0 || o.memory >= ENGRAM_MODE_COUNT) return ENGRAM_ERROR_MODE;
   if (!within(o.iterations, 1, ENGRAM_JUMP_ITERATIONS) || !within(o.iterations_jump, 1, ENGRAM_JUMP_ITERATIONS) ||
-      !within(o.line_search, 1, 10)) {
+      !within(o.line_search, 1, 10) || !within(o.starts, 1, 8)) {
     return ENGRAM_ERROR_ITERATIONS;
   }
   if (!within(o.budget_us, 0, kSecond) || (o.budget_us > 0 && o.clock == nullptr)) return ENGRAM_ERROR_BUDGET;
@@ -43,7 +43,7 @@ constexpr const char* kErrors[] = {
     "an argument is NULL: pass model, memory and handle",
     "the memory block is too small: it must have engram_sizeof(model) bytes",
     "options.memory is not an engram_mode: start from engram_default_options",
-    "options.iterations and iterations_jump must be 1 to 50, line_search 1 to 10",
+    "options.iterations and iterations_jump must be 1 to 50, starts 1 to 8, line_search 1 to 10",
     "options.budget_us must be 0 to 1e6 us, and a budget needs options.clock",
     "options.torque_rate must be positive, clearance_min within 1 m, switch_gain 0 to 1, hold_rate 1 to 100 rad/s",
     "options.state_gap_us and plan_age_us must be at least one tick, off_after_us at least state_gap_us, all at most 100 s",
@@ -64,6 +64,7 @@ static_assert(size_of(kStatuses) == ENGRAM_STATUS_COUNT && size_of(kRungs) == EN
 
 const char* engram_version(void) { return ENGRAM_VERSION; }
 const engram_description* engram_describe(const engram_model* model) { return &model->about; }
+uint64_t engram_table_digest(const engram_model* model) { return model->table_digest(); }
 const char* engram_error_text(engram_error error) { return text_of(kErrors, size_of(kErrors), error, "unknown error"); }
 const char* engram_status_text(engram_status status) { return text_of(kStatuses, size_of(kStatuses), status, "unknown status"); }
 const char* engram_rung_text(engram_rung rung) { return text_of(kRungs, size_of(kRungs), rung, "unknown rung"); }
@@ -74,8 +75,9 @@ void engram_default_options(const engram_model* model, engram_options* options) 
   options->memory = ENGRAM_MODE_MEMORY;
   options->iterations = 2;
   options->iterations_jump = 10;
+  options->starts = 3;
   options->line_search = 8;
-  options->torque_rate = 100.0;
+  options->torque_rate = 1000.0;
   options->clearance_min = 0.005;
   options->switch_gain = 0.1;
   options->hold_rate = 10.0;

@@ -43,7 +43,6 @@ typedef struct engram_description {
   const char* task;         // "reach"
   uint64_t robot_digest;    // of tables/<robot>/robot.h
   uint64_t task_digest;     // of tables/<robot>_<task>/task.h
-  uint64_t table_digest;    // of the memory's tables
   int32_t nq, nv, nu;       // configuration, velocity, control
   int32_t ntask;            // task vector
   int32_t knots;            // steps N of a plan; its states are N + 1
@@ -53,6 +52,8 @@ typedef struct engram_description {
 
 const char* engram_version(void);
 const engram_description* engram_describe(const engram_model* model);
+// Digest of all tables of the model's memory; 0: it has none.
+uint64_t engram_table_digest(const engram_model* model);
 
 // ---- outcomes ----
 
@@ -62,7 +63,7 @@ typedef enum engram_error {
   ENGRAM_ERROR_NULL,        // an argument that must not be NULL is NULL
   ENGRAM_ERROR_MEMORY,      // the block is smaller than engram_sizeof()
   ENGRAM_ERROR_MODE,        // options.memory
-  ENGRAM_ERROR_ITERATIONS,  // options.iterations, iterations_jump or line_search
+  ENGRAM_ERROR_ITERATIONS,  // options.iterations, iterations_jump, starts or line_search
   ENGRAM_ERROR_BUDGET,      // options.budget_us, or a budget without a clock
   ENGRAM_ERROR_LIMITS,      // options.torque_rate, clearance_min, hold_rate or switch_gain
   ENGRAM_ERROR_WATCHDOG,    // options.state_gap_us, plan_age_us or off_after_us
@@ -132,11 +133,13 @@ typedef double (*engram_clock)(void);
 typedef struct engram_options {
   engram_mode memory;       // which guesses are tried
   int32_t iterations;       // 1 to 50, FDDP iterations per period
-  int32_t iterations_jump;  // 1 to 50, in the period after a jump
+  int32_t iterations_jump;  // 1 to 50, in the period after a jump, from each start
+  int32_t starts;           // 1 to 8, most guesses that are iterated after a jump; they end in different postures
   int32_t line_search;      // 1 to 10, step lengths tried per iteration: 1, 1/2, 1/4 ...
   double budget_us;         // us, 0 to 1e6: no further iteration begins after it. 0: iterations alone count (reproducible)
   engram_clock clock;       // times the phases and the budget; NULL: no times, and budget_us must be 0
-  double torque_rate;       // > 0, largest change of a torque in units of its limit per second (1/s)
+  double torque_rate;       // > 0, largest change of a torque in units of its limit per second (1/s). Plans step from knot to knot:
+                            // a rate below some 100 per second distorts them
   double clearance_min;     // m, a plan that comes nearer to an obstacle is not executed
   double switch_gain;       // 0 to 1: another guess replaces a good shifted plan when its merit is below (1 - gain) of it
   double hold_rate;         // 1 to 100, bandwidth of the hold controller (rad/s)
@@ -206,8 +209,8 @@ typedef struct engram_cycle {
 } engram_cycle;
 void engram_cycle_info(const engram_controller* handle, engram_cycle* cycle);
 
-// The optimal control problem that the last jump posed (whole knots from the expected state x0) and how fast it was solved: merit
-// of the guess, and after each iteration of the jump's own period.
+// The optimal control problem that the last jump posed (whole knots from the expected state x0) and how fast it was solved from the
+// guess of lowest merit: merit of the guess, and after each iteration of the jump's own period.
 #define ENGRAM_JUMP_ITERATIONS 50
 typedef struct engram_jump {
   int32_t jump;                              // 0: none yet

@@ -3,8 +3,21 @@
 #include "controller/loop/loop_reach.h"
 #include "tables/panda_reach/task.h"
 
-namespace {
-using Model = engram::ReachModel<engram::tasks::PandaReach, engram::NoReachMemory<engram::tasks::PandaReach>>;
-}
+#if __has_include("tables/panda_reach/tables.h")
+#include "controller/loop/loop_reach_memory.h"
+#include "tables/panda_reach/tables.h"
 
-extern "C" constexpr engram_model engram_panda_reach = engram::loop_model<Model>("panda", "reach");
+namespace {
+using Task = engram::tasks::PandaReach;
+constexpr engram::MemoryTables kTables = {&panda_reach_knn_v1, &panda_reach_gpr_v1, &panda_reach_bow_v1, &panda_reach_time_v1,
+                                          &panda_reach_trust_v1};
+using Memory = engram::ReachMemory<Task, kTables>;
+}  // namespace
+#else  // before the first `make tables`
+namespace {
+using Task = engram::tasks::PandaReach;
+using Memory = engram::NoReachMemory<Task>;
+}  // namespace
+#endif
+
+extern "C" constexpr engram_model engram_panda_reach = engram::loop_model<engram::ReachModel<Task, Memory>>("panda", "reach");

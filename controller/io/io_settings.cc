@@ -33,7 +33,8 @@ void print_help(const Settings& s) {
       "                                shift   the shifted plan only\n"
       "                                cold    at a jump stand still, else the shifted plan\n"
       "  --iterations N              FDDP iterations per period (%d)\n"
-      "  --iterations-jump N         FDDP iterations in the period after a jump (%d)\n"
+      "  --iterations-jump N         FDDP iterations in the period after a jump, from each start (%d)\n"
+      "  --starts N                  guesses with different final postures that are iterated after a jump (%d)\n"
       "  --budget US                 CPU time per period after which no iteration begins; 0: none (lockstep 0, wall %.0f)\n"
       "  --timing FILE               write the CPU time of every cycle by phase, as CSV\n"
       "  --jumps FILE                write every jump's start, target, and merit after each iteration, as CSV\n"
@@ -42,7 +43,7 @@ void print_help(const Settings& s) {
       "\n"
       "Ends on SIGINT or SIGTERM with a summary. Exit codes: 0 ended as asked, %d wrong usage, %d no network,\n"
       "%d another controller serves the robot already.\n",
-      engram_describe(s.model)->robot, engram_describe(s.model)->task, s.lcm_url, s.options.iterations, s.options.iterations_jump,
+      engram_describe(s.model)->robot, engram_describe(s.model)->task, s.lcm_url, s.options.iterations, s.options.iterations_jump, s.options.starts,
       kWallBudgetUs, kExitUsage, kExitNetwork, kExitTaken);
 }
 
@@ -77,15 +78,16 @@ bool read_count(const char* text, int32_t* value) {
 }  // namespace
 
 bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
-  enum { kRobot = 1, kTask, kUrl, kClock, kMemory, kIterations, kIterationsJump, kBudget, kTiming, kJumps, kRealtime, kVersion, kHelp };
+  enum { kRobot = 1, kTask, kUrl, kClock, kMemory, kIterations, kIterationsJump, kStarts, kBudget, kTiming, kJumps, kRealtime, kVersion, kHelp };
   static const option kOptions[] = {
       {"robot", required_argument, nullptr, kRobot},           {"task", required_argument, nullptr, kTask},
       {"lcm-url", required_argument, nullptr, kUrl},           {"clock", required_argument, nullptr, kClock},
       {"memory", required_argument, nullptr, kMemory},         {"iterations", required_argument, nullptr, kIterations},
-      {"iterations-jump", required_argument, nullptr, kIterationsJump}, {"budget", required_argument, nullptr, kBudget},
-      {"timing", required_argument, nullptr, kTiming},         {"jumps", required_argument, nullptr, kJumps},
-      {"realtime", no_argument, nullptr, kRealtime},           {"version", no_argument, nullptr, kVersion},
-      {"help", no_argument, nullptr, kHelp},                   {nullptr, 0, nullptr, 0}};
+      {"iterations-jump", required_argument, nullptr, kIterationsJump}, {"starts", required_argument, nullptr, kStarts},
+      {"budget", required_argument, nullptr, kBudget},         {"timing", required_argument, nullptr, kTiming},
+      {"jumps", required_argument, nullptr, kJumps},           {"realtime", no_argument, nullptr, kRealtime},
+      {"version", no_argument, nullptr, kVersion},             {"help", no_argument, nullptr, kHelp},
+      {nullptr, 0, nullptr, 0}};
   s->model = kModels[0];
   engram_default_options(s->model, &s->options);
   s->options.clock = thread_cpu_us;
@@ -118,6 +120,9 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
         break;
       case kIterationsJump:
         if (!read_count(optarg, &s->options.iterations_jump)) return *exit_code = wrong("--iterations-jump %s: not a count", optarg), false;
+        break;
+      case kStarts:
+        if (!read_count(optarg, &s->options.starts)) return *exit_code = wrong("--starts %s: not a count", optarg), false;
         break;
       case kBudget:
         if (!read_number(optarg, &s->options.budget_us)) return *exit_code = wrong("--budget %s: not a number", optarg), false;

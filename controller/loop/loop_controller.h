@@ -27,9 +27,10 @@ template <class M> constexpr engram_model loop_model(const char* robot, const ch
   using P = typename M::P;
   static_assert(std::is_trivially_destructible_v<C>, "a controller is forgotten, never destroyed");
   return {
-      {robot, task, M::R::digest, M::Task::digest, M::Memory::kTableDigest, P::nq, P::nv, P::nu, M::ntask, M::N, 1e-6 * M::kStepUs, M::kTickUs},
+      {robot, task, M::R::digest, M::Task::digest, P::nq, P::nv, P::nu, M::ntask, M::N, 1e-6 * M::kStepUs, M::kTickUs},
       sizeof(C),
       M::Memory::tables_fit,
+      M::Memory::table_digest,
       [](const engram_model* m, const engram_options& o, void* at) -> engram_controller* { return new (at) C(m, o); },
       [](engram_controller* c, int64_t utime, int32_t jump, const double* value, int n) {
         return static_cast<C*>(c)->planner.set_task(utime, jump, value, n);

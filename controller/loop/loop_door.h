@@ -14,6 +14,7 @@ struct engram_model {
   engram_description about;
   size_t bytes;  // of the controller
   bool (*tables_fit)();
+  uint64_t (*table_digest)();
   engram_controller* (*build)(const engram_model*, const engram_options&, void* at);
   engram_status (*set_task)(engram_controller*, int64_t, int32_t, const double*, int);
   engram_status (*prepare)(engram_controller*, int64_t);

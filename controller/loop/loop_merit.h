@@ -15,10 +15,10 @@ template <class P> struct Candidate {
   const double (*x)[P::nx];
   const double (*u)[P::nu];
   double trust;  // [0, 1] of the memory; 0 for others
-  double merit;
+  double merit, cost;
 };
 
-// Fills the merit of n candidates on the horizon h. A trajectory that is not finite gets the merit +infinity.
+// Fills merit and cost of n candidates on the horizon h. A trajectory that is not finite gets the merit +infinity.
 template <class P, int N> void loop_merit(const Horizon<P, N>& h, Candidate<P>* candidates, int n) {
   using L = typename P::Layout;
   typename P::template Knot<Pack> knot;
@@ -26,7 +26,7 @@ template <class P, int N> void loop_merit(const Horizon<P, N>& h, Candidate<P>* 
   for (int first = 0; first < n; first += kLanes) {
     const Candidate<P>* c[kLanes];
     for (int l = 0; l < kLanes; ++l) c[l] = &candidates[first + l < n ? first + l : n - 1];
-    Pack x[P::nx], x_next[P::nx], u[P::nu], f[L::nxp], cost, merit = 0.0, gap = 0.0;
+    Pack x[P::nx], x_next[P::nx], u[P::nu], f[L::nxp], cost_k, cost = 0.0, gap = 0.0;
     for (int i = 0; i < P::nx; ++i) x_next[i] = h.x0[i];
     for (int k = 0; k <= h.n; ++k) {
       for (int i = 0; i < P::nx; ++i)
@@ -38,15 +38,16 @@ template <class P, int N> void loop_merit(const Horizon<P, N>& h, Candidate<P>* 
       if (k < h.n) {
         for (int i = 0; i < P::nu; ++i)
           for (int l = 0; l < kLanes; ++l) u[i].l[l] = c[l]->u[k][i];
-        P::calc(knot, x, u, x_next, cost);
+        P::calc(knot, x, u, x_next, cost_k);
       } else {
-        P::calc_terminal(knot, x, cost);
+        P::calc_terminal(knot, x, cost_k);
       }
-      merit += cost;
+      cost += cost_k;
     }
-    merit += Pack(kMeritWeight) * gap;
+    const Pack merit = cost + Pack(kMeritWeight) * gap;
     for (int l = 0; l < kLanes && first + l < n; ++l) {
       candidates[first + l].merit = std::isfinite(merit.l[l]) ? merit.l[l] : HUGE_VAL;
+      candidates[first + l].cost = cost.l[l];
     }
   }
 }

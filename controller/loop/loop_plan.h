@@ -37,7 +37,11 @@ template <int N> void knot_times(int64_t start, int64_t phase, int64_t step, int
 // After the last knot the plan rests: q_n, v = 0.
 template <class P, int N> void plan_state(const Plan<P, N>& plan, int64_t t, double* x) {
   constexpr int nq = P::nq, nv = P::nv;
-  if (t >= plan.utime[plan.n]) {
+  if (t == plan.utime[plan.n]) {
+    std::memcpy(x, plan.s.x[plan.n], sizeof(plan.s.x[0]));
+    return;
+  }
+  if (t > plan.utime[plan.n]) {
     std::memcpy(x, plan.s.x[plan.n], sizeof(double) * nq);
     std::memset(x + nq, 0, sizeof(double) * nv);
     return;
@@ -70,16 +74,37 @@ template <class P, int N> struct Seed {
   double u[N][P::nu];
 };
 
-// The plan on other knot times, of which the first state is x0. Beyond its end it rests under gravity torque.
+// Torque that gives the acceleration a (nv) in the state x, for a fully driven robot.
+template <class P> void inverse_dynamics(const double* x, const double* a, double* u) {
+  using R = typename P::R;
+  static_assert(P::nu == P::nv, "every dof is driven");
+  RbdData<R, double> d;
+  rbd_rnea<R>(x, x + P::nq, a, d, u);
+}
+
+// One knot further: comes to rest within a few knots, v' = v / 2, without a gap.
+template <class P> void come_to_rest(double dt, const double* x, double* u, double* x_next) {
+  double a[P::nv], dx[P::Layout::nxp] = {};
+  for (int i = 0; i < P::nv; ++i) {
+    const double v = x[P::nq + i], v_next = 0.5 * v;
+    a[i] = (v_next - v) / dt;
+    dx[P::Layout::oq + i] = dt * v_next;
+    dx[P::Layout::ov + i] = v_next - v;
+  }
+  inverse_dynamics<P>(x, a, u);
+  P::integrate(x, dx, x_next);
+}
+
+// The plan on other knot times, of which the first state is x0. Beyond its end it comes to rest.
 template <class P, int N>
 void resample(const Plan<P, N>& plan, const int64_t (&utime)[N + 1], const double* x0, Seed<P, N>& seed) {
   std::memcpy(seed.x[0], x0, sizeof(seed.x[0]));
-  for (int k = 1; k <= N; ++k) plan_state(plan, utime[k], seed.x[k]);
   for (int k = 0; k < N; ++k) {
-    if (utime[k] < plan.utime[plan.n]) {
+    if (utime[k + 1] <= plan.utime[plan.n]) {
       std::memcpy(seed.u[k], plan.s.u[plan.knot_at(utime[k])], sizeof(seed.u[k]));
+      plan_state(plan, utime[k + 1], seed.x[k + 1]);
     } else {
-      gravity_torque<P>(seed.x[k], seed.u[k]);
+      come_to_rest<P>(1e-6 * static_cast<double>(utime[k + 1] - utime[k]), seed.x[k], seed.u[k], seed.x[k + 1]);
     }
   }
 }

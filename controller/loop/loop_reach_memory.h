@@ -6,19 +6,26 @@
 #include "controller/memory/memory_check.h"
 #include "controller/memory/memory_query.h"
 
+#include <initializer_list>
+
 namespace engram {
 
-// Tables: a struct with `static constexpr uint64_t digest` and `static const MemoryTables& tables()`.
-template <class Task, class Tables> struct ReachMemory {
+template <class Task, const MemoryTables& tables> struct ReachMemory {
   static constexpr int kGuesses = kMemoryGuesses;
-  static constexpr uint64_t kTableDigest = Tables::digest;
 
   MemoryWork<Task> work;
   MemoryAnswer<Task> answer;
 
   static bool tables_fit() {
     char text[TAB_TEXT];
-    return memory_check<Task>(Tables::tables(), text) == kTabOk;
+    return memory_check<Task>(tables, text) == kTabOk;
+  }
+  static uint64_t table_digest() {
+    uint64_t digest = 0;
+    for (const TabHead* head : {&tables.knn->head, &tables.gpr->head, &tables.bow->head, &tables.time->head, &tables.trust->head}) {
+      digest = (digest ^ head->digest) * 0x100000001b3;  // as FNV-1a
+    }
+    return digest;
   }
 
   // Appends the guesses (the straight lines alone, unless `remember`) for the state x0 on N + 1 knot times t [s] to the n candidates;
@@ -30,13 +37,13 @@ template <class Task, class Tables> struct ReachMemory {
       opts.neighbours = 0;
       opts.regression = false;
     }
-    memory_query<Task>(Tables::tables(), opts, target, x0, N, t, work, answer);
+    memory_query<Task>(tables, opts, target, x0, N, t, work, answer);
     for (int i = 0; i < answer.n; ++i) {
       const Guess<Task>& g = answer.guess[i];
       const engram_candidate kind = g.kind == GuessKind::kNeighbour    ? ENGRAM_CANDIDATE_KNN
                                     : g.kind == GuessKind::kRegression ? ENGRAM_CANDIDATE_GPR
                                                                        : ENGRAM_CANDIDATE_LINE;
-      candidates[n++] = {kind, g.x, g.u, g.kind == GuessKind::kLine ? 0.0 : g.trust, 0.0};
+      candidates[n++] = {kind, g.x, g.u, g.kind == GuessKind::kLine ? 0.0 : g.trust, 0.0, 0.0};
     }
     return n;
   }

@@ -35,7 +35,7 @@ struct MeritTest : testing::Test {
       stand_still<P, N>(h.x0, seed[c]);
       for (auto& x : seed[c].x)
         for (double& value : x) value += noise(random);
-      candidates[c] = {ENGRAM_CANDIDATE_COLD, seed[c].x, seed[c].u, 0.0, 0.0};
+      candidates[c] = {ENGRAM_CANDIDATE_COLD, seed[c].x, seed[c].u, 0.0, 0.0, 0.0};
     }
   }
   double merit(const Seed<P, N>& s) const {
