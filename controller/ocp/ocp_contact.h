@@ -36,7 +36,8 @@ template <class C, class... Terms> struct ContactOcp {
   using Contacts = C;
   using Layout = LayoutOf<R>;
   using LqModel = ContactKnotModel<C>;
-  using Lanes = ContactLanes<C>;
+  template <class S> using LanesOf = ContactLanes<C, S>;
+  using Lanes = LanesOf<Pack>;
   static constexpr bool kPhases = true, kFreeBase = has_free_base<R>();
   static constexpr int nq = R::nq, nv = R::nv, nx = nq + nv, ndx = 2 * nv, nu = R::nu, nz = ndx + nu, nf = kContactRows<C>;
   static_assert(!(Terms::kNeedsGravity || ...), "gravity torque is not what holds a robot on its feet");
@@ -82,15 +83,16 @@ template <class C, class... Terms> struct ContactOcp {
     cost = sum_of_costs(knot, {x, x + nq, u, d, nullptr, nullptr}, lambda);
   }
 
-  // Next state, cost and the lanes' share of the linear-quadratic model of kLanes knots of one phase.
-  static void linearize(unsigned phase, const Knot<Pack>& knot, const Pack* x, const Pack* u, Pack* x_next, Pack& cost, Lanes& w) {
+  // Next state, cost and the lanes' share of the linear-quadratic model of knots of one phase.
+  template <class S>
+  static void linearize(unsigned phase, const Knot<S>& knot, const S* x, const S* u, S* x_next, S& cost, LanesOf<S>& w) {
     clear_costs(w);
     if (phase == kTerminalPhase) return linearize_terminal(knot, x, u, x_next, cost, w);
     const unsigned active = phase & ~kImpact;
-    Pack a[nv];
+    S a[nv];
     dynamics(phase, knot, x, u, w.d, w.cd, a);
     step(phase, knot.dt, x, a, x_next);
-    const KnotView<R, Pack> view{x, x + nq, u, w.d, nullptr, nullptr};
+    const KnotView<R, S> view{x, x + nq, u, w.d, nullptr, nullptr};
     cost = 0.0;
     ((cost += expand<Terms>(knot, view, w)), ...);
     if (phase & kImpact) {
@@ -107,7 +109,7 @@ template <class C, class... Terms> struct ContactOcp {
                               [&](int c, auto& dTq, auto& dTv) { rbd_contact_constraint_derivatives(w.d, w.cd, c, dTq, dTv); });
     }
     if constexpr (kFreeBase) {
-      Pack dq[6];
+      S dq[6];
       for (int i = 0; i < 6; ++i) dq[i] = knot.dt * x_next[nq + i];
       rbd_integrate_jacobians(dq, w.cost.E, w.cost.G);
     }
@@ -124,12 +126,13 @@ template <class C, class... Terms> struct ContactOcp {
   }
 
  private:
-  static void linearize_terminal(const Knot<Pack>& knot, const Pack* x, const Pack* u, Pack* x_next, Pack& cost, Lanes& w) {
+  template <class S>
+  static void linearize_terminal(const Knot<S>& knot, const S* x, const S* u, S* x_next, S& cost, LanesOf<S>& w) {
     rbd_kinematics(x, w.d);
     rbd_velocity(x + nq, w.d);
     rbd_subtree_moments(w.d);
-    for (Pack& l : w.cd.lambda) l = 0.0;
-    const KnotView<R, Pack> view{x, x + nq, u, w.d, nullptr, nullptr};
+    for (S& l : w.cd.lambda) l = 0.0;
+    const KnotView<R, S> view{x, x + nq, u, w.d, nullptr, nullptr};
     cost = 0.0;
     ((cost += expand<Terms>(knot, view, w)), ...);
     for (int i = 0; i < nx; ++i) x_next[i] = x[i];
@@ -167,8 +170,8 @@ template <class C, class... Terms> struct ContactOcp {
     if constexpr (kIsForceTerm<Term>) return Term::cost(p, lambda + kContactTree<C>.first[Term::kContact]);
     else return Term::cost(p, view);
   }
-  template <class Term> static Pack expand(const Knot<Pack>& knot, const KnotView<R, Pack>& view, Lanes& w) {
-    const typename Term::template Param<Pack>& p = knot;
+  template <class Term, class S> static S expand(const Knot<S>& knot, const KnotView<R, S>& view, LanesOf<S>& w) {
+    const typename Term::template Param<S>& p = knot;
     if constexpr (kIsForceTerm<Term>) {
       constexpr int first = kContactTree<C>.first[Term::kContact];
       return Term::expand(p, w.cd.lambda + first, w.g + first, w.H[Term::kContact]);
@@ -178,21 +181,21 @@ template <class C, class... Terms> struct ContactOcp {
   }
 
   // Zero where terms add: gradient, lower block qq and diagonal.
-  static void clear_costs(Lanes& w) {
+  template <class S> static void clear_costs(LanesOf<S>& w) {
     for (int i = 0; i < Layout::nzp; ++i) w.cost.Lz[i] = w.cost.Lzz[i][i] = 0.0;
     for (int i = 0; i < nv; ++i)
       for (int j = 0; j < i; ++j) w.cost.Lzz[i][j] = 0.0;
-    for (Pack& g : w.g) g = 0.0;
+    for (S& g : w.g) g = 0.0;
     for (auto& H : w.H)
       for (auto& row : H)
-        for (Pack& h : row) h = 0.0;
+        for (S& h : row) h = 0.0;
   }
 
   // Xu = L^-T d(M a + b - J' lambda - B u)/du = -L^-T B
-  static void control_columns(Lanes& w) {
+  template <class S> static void control_columns(LanesOf<S>& w) {
     for (int i = 0; i < nu; ++i) {
       const int dof = Actuation<R>::dof(i);
-      for (int k = 0; k < nv; ++k) w.x.Xu[k][i] = -Actuation<R>::entry(k, i);
+      for (int k = 0; k < nv; ++k) w.x.Xu[k][i] = S(-Actuation<R>::entry(k, i));
       for (int k = dof < 0 ? nv - 1 : dof; k >= 0; k = dof < 0 ? k - 1 : kTree<R>.parent[k])
         for (int j = kTree<R>.parent[k]; j >= 0; j = kTree<R>.parent[j]) w.x.Xu[j][i] = nmadd(w.d.L(k, j), w.x.Xu[k][i], w.x.Xu[j][i]);
     }

@@ -60,27 +60,27 @@ template <class C, class F, int... c> inline void for_contact(F f, std::integer_
 }
 template <class C, class F> inline void for_contact(F f) { for_contact<C>(f, std::make_integer_sequence<int, C::n>{}); }
 
-// What the lanes of kLanes knots leave for the dense step.
-template <class C> struct ContactLanes {
+// What the lanes of kLanes knots (S = Pack) leave for the dense step.
+template <class C, class S> struct ContactLanes {
   using R = typename C::Robot;
-  RbdData<R, Pack> d;
-  ContactData<C, Pack> cd;
-  ContactDerivatives<C, R::nu, Pack> x;
-  ModelOf<R, Pack> cost;              // base blocks, gradient and Hessian of the costs of state and control
-  Pack g[kContactRows<C>];            // gradient of the force costs
-  Pack H[C::n][6][6];                 // their Hessian
+  RbdData<R, S> d;
+  ContactData<C, S> cd;
+  ContactDerivatives<C, R::nu, S> x;
+  ModelOf<R, S> cost;              // base blocks, gradient and Hessian of the costs of state and control
+  S g[kContactRows<C>];            // gradient of the force costs
+  S H[C::n][6][6];                 // their Hessian
 };
 
 // Fills D, F, E and G of the model of one lane. step: dt of a knot in time, 1 of an impact.
 template <class C>
-inline void contact_finish_dynamics(const ContactLanes<C>& in, int lane, unsigned active, double step, ContactKnotModel<C>& m) {
+inline void contact_finish_dynamics(const ContactLanes<C, Pack>& in, int lane, unsigned active, double step, ContactKnotModel<C>& m) {
   using R = typename C::Robot;
   using L = LayoutOf<R>;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
   constexpr int nv = R::nv, nu = R::nu, nzp = L::nzp, nf = kContactRows<C>;
   const ActiveRows<C> rows(active);
-  double coefficient[nf + nv];
-  const double* row[nf + nv];
+  double coefficient[nf + nv] = {};
+  const double* row[nf + nv] = {};
 
   // F = G^-1 B
   for (int I = 0; I < rows.n; ++I) {
@@ -156,7 +156,7 @@ inline void contact_finish_dynamics(const ContactLanes<C>& in, int lane, unsigne
 }
 
 // Fills the costs of the model of one lane, those of the forces for active contacts. After contact_finish_dynamics if any is active.
-template <class C> inline void contact_finish_costs(const ContactLanes<C>& in, int lane, unsigned active, ContactKnotModel<C>& m) {
+template <class C> inline void contact_finish_costs(const ContactLanes<C, Pack>& in, int lane, unsigned active, ContactKnotModel<C>& m) {
   using R = typename C::Robot;
   using L = LayoutOf<R>;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
@@ -177,8 +177,8 @@ template <class C> inline void contact_finish_costs(const ContactLanes<C>& in, i
         largest += std::fabs(m.H[c][r][t]);
       }
     if (!(largest == 0.0)) m.forces |= 1u << c;
-    double coefficient[6];
-    const double* row[6];
+    double coefficient[6] = {};
+    const double* row[6] = {};
     for (int r = 0; r < tree.rows[c]; ++r) {
       coefficient[r] = in.g[tree.first[c] + r].l[lane];
       row[r] = m.F[tree.first[c] + r];

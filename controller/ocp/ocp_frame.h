@@ -121,5 +121,45 @@ template <class R, int frame> struct FramePlacementTerm {
   }
 };
 
+// 1/2 w |p_WF - p*|^2: the position alone.
+template <class R, int frame> struct FrameTranslationTerm {
+  static constexpr bool kNeedsGravity = false;
+  static constexpr DofPath<R> path{R::frame_joint[frame]};
+  template <class S> struct Param {
+    S translation_w;     // [1/m^2]
+    S translation_p[3];  // p* [m], world axes
+  };
+
+  template <class S> static S cost(const Param<S>& p, const KnotView<R, S>& k) {
+    Vec3<S> p_WF;
+    const Vec3<S> r = residual(p, k, p_WF);
+    return S(0.5) * p.translation_w * dot(r, r);
+  }
+
+  template <class S> static S expand(const Param<S>& p, const KnotView<R, S>& k, ModelOf<R, S>& M) {
+    Vec3<S> p_WF;
+    const Vec3<S> r3 = residual(p, k, p_WF);
+    S J[3][R::nv], r[3], w[3];
+    for (int a = 0; a < path.n; ++a) {
+      const Motion<S>& column = k.d.J[path.dof[a]];
+      const Vec3<S> lin = cross_add(column.ang, p_WF, column.lin);
+      for (int i = 0; i < 3; ++i) J[i][a] = lin[i];
+    }
+    for (int i = 0; i < 3; ++i) {
+      r[i] = r3[i];
+      w[i] = p.translation_w;
+    }
+    add_gauss_newton(J, path.dof, path.n, r, w, M);
+    return S(0.5) * p.translation_w * dot(r3, r3);
+  }
+
+ private:
+  template <class S> static Vec3<S> residual(const Param<S>& p, const KnotView<R, S>& k, Vec3<S>& p_WF) {
+    Mat3<S> R_WF;
+    rbd_frame_placement<R>(k.d, frame, R_WF, p_WF);
+    return p_WF - Vec3<S>(p.translation_p[0], p.translation_p[1], p.translation_p[2]);
+  }
+};
+
 }  // namespace engram
 #endif  // CONTROLLER_OCP_OCP_FRAME_H_

@@ -63,7 +63,7 @@ constexpr bool contact_active(unsigned active, int c) { return (active >> c & 1u
 // The rows of the active contacts, in order.
 template <class C> struct ActiveRows {
   int n = 0;
-  int row[kContactRows<C>];
+  int row[kContactRows<C>] = {};
   explicit ActiveRows(unsigned active) {
     for (int c = 0; c < C::n; ++c) {
       for (int r = kContactTree<C>.first[c]; contact_active(active, c) && r < kContactTree<C>.first[c + 1]; ++r) row[n++] = r;
