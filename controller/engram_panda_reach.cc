@@ -1,23 +1,15 @@
 // The Panda that reaches: robot, task and memory bound into one model.
 #include "controller/loop/loop_controller.h"
 #include "controller/loop/loop_reach.h"
-#include "tables/panda_reach/task.h"
-
-#if __has_include("tables/panda_reach/tables.h")
 #include "controller/loop/loop_reach_memory.h"
 #include "tables/panda_reach/tables.h"
+#include "tables/panda_reach/task.h"
 
 namespace {
 using Task = engram::tasks::PandaReach;
 constexpr engram::MemoryTables kTables = {&panda_reach_knn_v1, &panda_reach_gpr_v1, &panda_reach_bow_v1, &panda_reach_time_v1,
                                           &panda_reach_trust_v1};
-using Memory = engram::ReachMemory<Task, kTables>;
+using Model = engram::ReachModel<Task, engram::ReachMemory<Task, kTables>>;
 }  // namespace
-#else  // before the first `make tables`
-namespace {
-using Task = engram::tasks::PandaReach;
-using Memory = engram::NoReachMemory<Task>;
-}  // namespace
-#endif
 
-extern "C" constexpr engram_model engram_panda_reach = engram::loop_model<engram::ReachModel<Task, Memory>>("panda", "reach");
+extern "C" constexpr engram_model engram_panda_reach = engram::loop_model<Model>("panda", "reach");
