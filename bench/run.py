@@ -1,8 +1,8 @@
 """Time the controller's solver and rigid-body algorithms beside their peers, in one run: `make bench`.
 
 First the gate: both sides compute the same numbers from the same input, to the tolerances below. Then the two executables
-alternate, A B A B, so that a drift of the machine's speed hits both; every ratio is peer / ours of the medians, and none is
-printed where the gate does not hold. The figures go to build/figures/bench.json.
+alternate, A B A B, so that a drift of the machine's speed hits both. Times are processor times of one thread; every ratio is
+peer / ours of the medians, and none is printed where the gate does not hold. The figures go to build/figures/bench.json.
 """
 
 from __future__ import annotations
@@ -121,7 +121,7 @@ def gate_problem(name: str, ours: dict, peer: dict) -> bool:
 
 @dataclass
 class Samples:
-    """Microseconds, pooled over the rounds."""
+    """Microseconds of processor time, pooled over the rounds."""
 
     us: np.ndarray
 
@@ -228,7 +228,7 @@ class Bench:
         pin.seed(0)
         samples = [
             np.r_[pin.randomConfiguration(model, -np.ones(model.nq), np.ones(model.nq)), rng.uniform(-1, 1, 3 * model.nv)]
-            for _ in range(64)
+            for _ in range(256)
         ]
         file = self.numbers(f"{robot}_samples", *samples)
         peer_exe = self.peers / "pinocchio_bench"

@@ -1,6 +1,7 @@
 """Draw random tasks and solve them: the motions that a memory is made from."""
 
 import argparse
+import hashlib
 import json
 import os
 import time
@@ -13,7 +14,7 @@ CHUNK = 20  # tasks in a file: what a stop may lose, per worker
 EXAMPLES = """examples:
   engram data panda reach                  as many tasks as models/panda/reach/task.toml asks for
   engram data panda reach --n 200 --seed 7 another, smaller set
-A run that was stopped goes on where it was; another seed, task or solver setting starts anew.
+A run that was stopped goes on where it was; another seed, task, solver setting or build starts anew.
 """
 
 
@@ -57,15 +58,18 @@ def solve_all(spec, n: int, seed: int, workers: int, out: Path) -> dict:
     import numpy as np
 
     from engram.data import chunks, reach
+    from engram.engine import engine
 
     settings = reach.Settings()
     name = f"{spec.robot.name}_{spec.name}"
     made_from = f"task {spec.digest:016x} seed {seed} {settings}"
     arguments = (spec.robot.name, spec.name, seed, settings)
-    lines = chunks.Chunks(out / f"{name}_lines", made_from, n, CHUNK)
+    # what another build of the solver has left is not mixed with this one's
+    key = f"{made_from} engine {hashlib.sha256(Path(engine.__file__).read_bytes()).hexdigest()[:16]}"
+    lines = chunks.Chunks(out / f"{name}_lines", key, n, CHUNK)
     first = chunks.run(lines, reach.make_lines, arguments, workers, "data:   lines")
     # the neighbours of a task are among all n: another n is another second pass
-    neighbours = chunks.Chunks(out / f"{name}_neighbours", f"{made_from} n {n}", n, CHUNK)
+    neighbours = chunks.Chunks(out / f"{name}_neighbours", f"{key} n {n}", n, CHUNK)
     arrays = chunks.run(neighbours, reach.make_neighbours, (*arguments, first), workers, "data:   neighbours")
 
     good = arrays["outcome"] == reach.OK
