@@ -37,6 +37,11 @@ def svg(fig) -> str:
     return re.sub(r"^.*?(?=<svg)|<metadata>.*?</metadata>", "", text.getvalue(), flags=re.S)
 
 
+def legend_above(ax, columns: int = 4) -> None:
+    """A legend that hides no curve."""
+    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns)
+
+
 def success(runs: list[Run]) -> str:
     """Share of successful jumps with its 95 % Wilson interval."""
     fig, ax = figure(5.6, 0.55 * len(runs) + 0.9)
@@ -65,7 +70,7 @@ def arrivals(runs: list[Run], window: float) -> str:
         x, y = np.concatenate([[0], times, [window]]), np.concatenate([[0], share, share[-1:] if len(share) else [0]])
         ax.step(x, y, where="post", color=COLOUR.get(run.mode, INK), linewidth=2, label=run.mode)
     ax.set(xlim=(0, window), ylim=(0, 100), xlabel="time since the jump (s)", ylabel="jumps arrived (%)")
-    ax.legend(loc="lower right")
+    legend_above(ax)
     return svg(fig)
 
 
@@ -88,7 +93,7 @@ def hand_error(motions: list[Motion], window: float, tolerance: float) -> str:
             ax.fill_between(times, low, high, color=colour, alpha=0.15, linewidth=0)
     ax.axhline(1e3 * tolerance, color=INK, linewidth=0.8, linestyle=":")
     ax.set(yscale="log", xlim=(0, window), xlabel="time since the jump (s)", ylabel="hand to target (mm)")
-    ax.legend(loc="upper right")
+    legend_above(ax)
     return svg(fig)
 
 
@@ -103,7 +108,7 @@ def suboptimality(curves: dict[str, np.ndarray]) -> str:
         ax.plot(k, middle, color=COLOUR.get(mode, INK), linewidth=2, marker="o", markersize=3.5, label=mode)
         ax.fill_between(k, low, high, color=COLOUR.get(mode, INK), alpha=0.12, linewidth=0)
     ax.set(yscale="log", xlabel="iterations after the jump", ylabel="suboptimality (merit - J*) / J*")
-    ax.legend(loc="upper right")
+    legend_above(ax)
     return svg(fig)
 
 
@@ -155,7 +160,7 @@ def winners(motions: list[Motion]) -> str | None:
     ax.set_yticks(range(len(motions)), [motion.run.mode for motion in reversed(motions)])
     ax.set(xlim=(0, 100), xlabel="winner at jumps (%)")
     ax.grid(axis="y", visible=False)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=len(shown))
+    legend_above(ax, len(shown))
     return svg(fig)
 
 
@@ -181,7 +186,7 @@ def cycle_times(runs: list[Run], period_us: float = 1e4) -> str | None:
     ax.axvline(1e-3 * period_us, color=INK, linewidth=0.8, linestyle=":")
     ax.text(1e-3 * period_us, ax.get_ylim()[1], " period", va="top", fontsize=9)
     ax.set(xscale="log", yscale="log", xlabel="CPU time of a cycle (ms)", ylabel="cycles (%)")
-    ax.legend(loc="upper left")
+    legend_above(ax)
     return svg(fig)
 
 
@@ -205,7 +210,7 @@ def phases(motion: Motion) -> str | None:
     ax.set_yticks(range(len(rows)), [label for label, _ in reversed(rows)])
     ax.set_xlabel("mean CPU time of a cycle (ms)")
     ax.grid(axis="y", visible=False)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+    legend_above(ax, 3)
     return svg(fig)
 
 
@@ -223,7 +228,7 @@ def torques(motion: Motion) -> str | None:
     ax.set_xticks(x, [str(i + 1) for i in x])
     ax.set(xlabel="joint", ylabel="torque over its limit (%)", ylim=(0, 105))
     ax.grid(axis="x", visible=False)
-    ax.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+    legend_above(ax, 3)
     return svg(fig)
 
 

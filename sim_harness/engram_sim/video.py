@@ -130,16 +130,13 @@ def join(pieces: list[Path], out: Path) -> None:
 
 
 def telling_second(runs: list[Run], seconds: float) -> float:
-    """When `render` shows the end of its first jump that some modes solve and some do not (else of its first clip)."""
-    first, start = 0.0, 0.0
+    """When `render` shows the end of the jump that tells the modes apart best: the first mode succeeds, the fewest others do."""
+    ends, start = [], 0.0
     for _, n, move in choose(runs, seconds):
         jumps = [next(jump for jump in run.jumps if jump["jump"] == n) for run in runs]
-        end = start + duration(jumps, move)
-        first = first or end
-        if not move and len({jump["success"] for jump in jumps}) > 1:
-            return end - BEFORE_END
-        start = end
-    return first - BEFORE_END
+        start += duration(jumps, move)
+        ends.append((move or not jumps[0]["success"], sum(jump["success"] for jump in jumps), start))
+    return min(ends)[2] - BEFORE_END
 
 
 def still(video: Path, out: Path, second: float) -> None:
