@@ -13,7 +13,7 @@ namespace engram {
 template <class Task> struct MemoryWork {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots, nq = R::nq;
-  static constexpr int kSlots = kMemoryPool + 2 * kMemoryLines;
+  static constexpr int kSlots = kMemoryNeighbours + (kLanes > 2 * kMemoryLines ? kLanes : 2 * kMemoryLines);
   // A guess in the making.
   struct Slot {
     GuessKind kind;
@@ -39,6 +39,7 @@ template <class Task> struct MemoryWork {
 };
 
 inline constexpr double kMemoryIkTolerance = 1e-3;  // [m, rad] an end farther from the goal counts as not reached
+inline constexpr int kMemoryWarpIterations = 10;     // of inverse kinematics from a remembered end, which is near
 inline constexpr double kMemoryFar = 1e3;           // distance that stands for "no sample at all"
 inline constexpr double kMemoryHuge = 1e6;          // no state, goal or time is that large
 
@@ -65,7 +66,7 @@ typename MemoryWork<Task>::Slot& add(MemoryWork<Task>& w, int& slots, GuessKind 
 }
 
 // Inverse kinematics from the start of the slots [first, end), kLanes at a time -> end, reached.
-template <class Task> void find_ends(const ReachTarget& goal, int first, int end, MemoryWork<Task>& w) {
+template <class Task> void find_ends(const ReachTarget& goal, int iterations, int first, int end, MemoryWork<Task>& w) {
   using R = typename Task::Robot;
   for (; first < end; first += kLanes) {
     Pack q[R::nq];
@@ -73,7 +74,7 @@ template <class Task> void find_ends(const ReachTarget& goal, int first, int end
       const auto& slot = w.slot[first + l < end ? first + l : first];
       for (int i = 0; i < R::nq; ++i) q[i].l[l] = slot.start[i];
     }
-    const Pack error = ik_pose<R, Task::frame>(goal, q, w.rbd);
+    const Pack error = ik_pose<R, Task::frame>(goal, q, w.rbd, iterations);
     for (int l = 0; l < kLanes && first + l < end; ++l) {
       auto& slot = w.slot[first + l];
       for (int i = 0; i < R::nq; ++i) slot.end[i] = q[i].l[l];
@@ -97,16 +98,20 @@ int find_neighbours(const MemoryTables& tables, const MemoryOpts& opts, const Re
   memory_features<Task>(x0, goal, w.features);
   answer.status = tab_knn_query(tables.knn, w.features, kMemoryPool, w.index, w.distance2);
   answer.distance = std::sqrt(w.distance2[0]);
-  int pool = 0, kept = 0;
-  for (int i = 0; i < kMemoryPool && w.index[i] >= 0; ++i) {
-    const float* const value = tab_knn_value(tables.knn, w.index[i]);
-    auto& slot = add(w, pool, GuessKind::kNeighbour, w.index[i], value + nq, std::sqrt(w.distance2[i]));
-    for (int j = 0; j < nq; ++j) slot.start[j] = value[j];
-  }
-  find_ends(goal, 0, pool, w);
-  for (int i = 0; i < pool && kept < opts.neighbours; ++i) {
-    if (w.slot[i].reached && warp_of<Task>(w.slot[i]) <= opts.max_warp) w.slot[kept++] = w.slot[i];
-    else ++answer.refused;
+  int kept = 0;
+  for (int first = 0; first < kMemoryPool && kept < opts.neighbours; first += kLanes) {
+    // the next kLanes samples sit behind those that are kept
+    int last = kept;
+    for (int i = first; i < first + kLanes && i < kMemoryPool && w.index[i] >= 0; ++i) {
+      const float* const value = tab_knn_value(tables.knn, w.index[i]);
+      auto& slot = add(w, last, GuessKind::kNeighbour, w.index[i], value + nq, std::sqrt(w.distance2[i]));
+      for (int j = 0; j < nq; ++j) slot.start[j] = value[j];
+    }
+    find_ends(goal, kMemoryWarpIterations, kept, last, w);
+    for (int i = kept; i < last && kept < opts.neighbours; ++i) {
+      if (w.slot[i].reached && warp_of<Task>(w.slot[i]) <= opts.max_warp) w.slot[kept++] = w.slot[i];
+      else ++answer.refused;
+    }
   }
   return kept;
 }
@@ -123,7 +128,7 @@ int find_lines(const MemoryTables& tables, const MemoryOpts& opts, const ReachTa
     for (int i = 0; i < R::nq; ++i) slot.start[i] = start[i];
   }
   const int last = slots;
-  find_ends(goal, first, last, w);
+  find_ends(goal, IkOptions{}.iterations, first, last, w);
   for (int i = first; i < last && opts.regression; ++i) {
     if (!w.slot[i].reached) continue;
     auto& slot = w.slot[slots++];

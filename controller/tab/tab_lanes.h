@@ -1,4 +1,4 @@
-// Eight floats side by side, and the loads the evaluators share. Internal to controller/tab.
+// Eight floats or four doubles side by side, and what the evaluators share. Internal to controller/tab.
 #ifndef CONTROLLER_TAB_TAB_LANES_H_
 #define CONTROLLER_TAB_TAB_LANES_H_
 
@@ -11,6 +11,7 @@ namespace engram {
 #pragma GCC diagnostic ignored "-Wpsabi"  // on a target without AVX: these functions are inlined, no ABI is crossed
 
 typedef float TabLanes __attribute__((vector_size(TAB_LANES * sizeof(float))));
+typedef double TabDoubles __attribute__((vector_size(TAB_LANES * sizeof(float))));
 
 inline TabLanes tab_load(const float* p) {
   TabLanes v;

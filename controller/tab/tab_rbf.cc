@@ -1,6 +1,10 @@
 #include "controller/tab/tab_rbf.h"
 
+#include "controller/tab/tab_lanes.h"
+
 #include <cmath>
+
+using engram::TabDoubles;
 
 extern "C" {
 
@@ -40,11 +44,22 @@ TabStatus tab_rbf_basis(const TabRbf* tab, int32_t nt, const double* t, double* 
 }
 
 void tab_rbf_eval(const TabRbf* tab, const float* w, int32_t first, int32_t count, int32_t nt, const double* phi, double* y) {
-  for (int32_t row = 0; row < nt; ++row, phi += tab->k, y += count) {
-    for (int32_t j = 0; j < count; ++j) y[j] = 0;
+  // eight channels at a time: their weights as doubles, then one pass over the rows
+  for (int32_t block = 0; block < count; block += TAB_LANES) {
+    const int32_t channels = count - block < TAB_LANES ? count - block : TAB_LANES;
+    TabDoubles weight[TAB_RBF_MAX_K][2] = {};
     for (int32_t i = 0; i < tab->k; ++i) {
-      const float* weight = w + static_cast<int64_t>(i) * tab->nchannel + first;
-      for (int32_t j = 0; j < count; ++j) y[j] += phi[i] * weight[j];
+      const float* source = w + static_cast<int64_t>(i) * tab->nchannel + first + block;
+      for (int32_t j = 0; j < channels; ++j) weight[i][j / 4][j % 4] = source[j];
+    }
+    for (int32_t row = 0; row < nt; ++row) {
+      TabDoubles sum[2] = {};
+      const double* basis = phi + static_cast<int64_t>(row) * tab->k;
+      for (int32_t i = 0; i < tab->k; ++i) {
+        sum[0] += basis[i] * weight[i][0];
+        sum[1] += basis[i] * weight[i][1];
+      }
+      for (int32_t j = 0; j < channels; ++j) y[static_cast<int64_t>(row) * count + block + j] = sum[j / 4][j % 4];
     }
   }
 }

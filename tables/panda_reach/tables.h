@@ -8,8 +8,6 @@
 #include "controller/tab/tab_pca.h"
 #include "controller/tab/tab_rbf.h"
 
-#define PANDA_REACH_TABLES_DIGEST 0xf5e0bb0cac9c9f92u  /* of all tables */
-
 #ifdef __cplusplus
 extern "C" {
 #endif
