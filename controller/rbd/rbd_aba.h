@@ -13,13 +13,13 @@ template <class S> struct ArticulatedInertia {
   Mat3<S> B;
 
   ArticulatedInertia() = default;
-  explicit ArticulatedInertia(const Inertia<S>& Y) {
+  ENGRAM_INLINE explicit ArticulatedInertia(const Inertia<S>& Y) {
     A[0] = A[3] = A[5] = Y.mass;
     A[1] = A[2] = A[4] = S(0.0);
     B = skew<S>(-Y.moment);
     for (int i = 0; i < 6; ++i) C[i] = Y.I[i];
   }
-  ArticulatedInertia& operator+=(const ArticulatedInertia& b) {
+  ENGRAM_INLINE ArticulatedInertia& operator+=(const ArticulatedInertia& b) {
     for (int i = 0; i < 6; ++i) {
       A[i] += b.A[i];
       C[i] += b.C[i];
@@ -27,11 +27,11 @@ template <class S> struct ArticulatedInertia {
     B += b.B;
     return *this;
   }
-  friend Force<S> operator*(const ArticulatedInertia& I, const Motion<S>& a) {
+  ENGRAM_INLINE friend Force<S> operator*(const ArticulatedInertia& I, const Motion<S>& a) {
     return {mul_symmetric_add(I.A, a.lin, mul(I.B, a.ang)), mul_symmetric_add(I.C, a.ang, mul_transposed(I.B, a.lin))};
   }
   // I -= s U U'
-  void downdate(const Force<S>& U, S s) {
+  ENGRAM_INLINE void downdate(const Force<S>& U, S s) {
     const Vec3<S> f = U.lin * s, n = U.ang * s;
     for (int i = 0, e = 0; i < 3; ++i) {
       for (int j = i; j < 3; ++j, ++e) {

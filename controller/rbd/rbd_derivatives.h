@@ -21,27 +21,29 @@ template <class S> struct Coriolis {
   Vec3<S> p2;
   Mat3<S> D;
 
-  Coriolis& operator+=(const Coriolis& b) {
+  ENGRAM_INLINE Coriolis& operator+=(const Coriolis& b) {
     p2 += b.p2;
     D += b.D;
     return *this;
   }
-  Force<S> times_add(const Vec3<S>& w, const Force<S>& f) const { return {cross_add(w, p2, f.lin), mul_add(D, w, f.ang)}; }
+  ENGRAM_INLINE Force<S> times_add(const Vec3<S>& w, const Force<S>& f) const {
+    return {cross_add(w, p2, f.lin), mul_add(D, w, f.ang)};
+  }
   // g with J . C x = g . w_x
-  Vec3<S> transposed_times(const Motion<S>& J) const { return cross_add(p2, J.lin, mul_transposed(D, J.ang)); }
+  ENGRAM_INLINE Vec3<S> transposed_times(const Motion<S>& J) const { return cross_add(p2, J.lin, mul_transposed(D, J.ang)); }
 };
 
 // N = sum m (u + w x r) r' = u mc' + [w]x E,  E = sum m r r' = tr(I)/2 1 - I  (tr([w]x E) = 0)
-template <class S> inline Coriolis<S> coriolis_of(const Inertia<S>& Y, const Motion<S>& V) {
+template <class S> ENGRAM_INLINE Coriolis<S> coriolis_of(const Inertia<S>& Y, const Motion<S>& V) {
   Coriolis<S> C;
   const S half_trace = 0.5 * (Y.I[0] + Y.I[3] + Y.I[5]);
   const Vec3<S> w2 = V.ang * S(2.0), u2 = V.lin * S(2.0);
   C.p2 = cross_add<S>(w2, Y.moment, u2 * Y.mass);
-  const Vec3<S> E[3] = {
-      {half_trace - Y.I[0], -Y.I[1], -Y.I[2]}, {-Y.I[1], half_trace - Y.I[3], -Y.I[4]}, {-Y.I[2], -Y.I[4], half_trace - Y.I[5]}};
-  for (int j = 0; j < 3; ++j) C.D.col(j) = -cross_add<S>(w2, E[j], u2 * Y.moment[j]);
   const S trace = dot(u2, Y.moment);
-  for (int j = 0; j < 3; ++j) C.D(j, j) += trace;
+  const auto minus_column = [&](const Vec3<S>& e, S moment) { return -cross_add(w2, e, u2 * moment); };
+  C.D = {minus_column({half_trace - Y.I[0], -Y.I[1], -Y.I[2]}, Y.moment[0]) + Vec3<S>(trace, S(0.0), S(0.0)),
+         minus_column({-Y.I[1], half_trace - Y.I[3], -Y.I[4]}, Y.moment[1]) + Vec3<S>(S(0.0), trace, S(0.0)),
+         minus_column({-Y.I[2], -Y.I[4], half_trace - Y.I[5]}, Y.moment[2]) + Vec3<S>(S(0.0), S(0.0), trace)};
   return C;
 }
 

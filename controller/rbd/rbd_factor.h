@@ -69,19 +69,19 @@ template <class R> inline constexpr Segments<R> kSegments{};
 template <class S, int w> struct RowPart {
   S x[w];
 
-  explicit RowPart(double all) {
+  ENGRAM_INLINE explicit RowPart(double all) {
     for (int i = 0; i < w; ++i) x[i] = S(all);
   }
-  explicit RowPart(const S* from) {
+  ENGRAM_INLINE explicit RowPart(const S* from) {
     for (int i = 0; i < w; ++i) x[i] = from[i];
   }
-  void store(S* to) const {
+  ENGRAM_INLINE void store(S* to) const {
     for (int i = 0; i < w; ++i) to[i] = x[i];
   }
-  void subtract(S l, const S* row) {
+  ENGRAM_INLINE void subtract(S l, const S* row) {
     for (int i = 0; i < w; ++i) x[i] = nmadd(l, row[i], x[i]);
   }
-  void scale(S d) {
+  ENGRAM_INLINE void scale(S d) {
     for (int i = 0; i < w; ++i) x[i] *= d;
   }
 };
@@ -92,23 +92,23 @@ template <int w> struct RowPart<double, w> {
   Pack p[w / kLanes + 1];
   double x[kLanes];
 
-  explicit RowPart(double all) {
+  ENGRAM_INLINE explicit RowPart(double all) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] = Pack(all);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] = all;
   }
-  explicit RowPart(const double* from) {
+  ENGRAM_INLINE explicit RowPart(const double* from) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] = load_pack(from + i);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] = from[i];
   }
-  void store(double* to) const {
+  ENGRAM_INLINE void store(double* to) const {
     for (int i = 0; i < in_packs; i += kLanes) store_pack(p[i / kLanes], to + i);
     for (int i = in_packs; i < w; ++i) to[i] = x[i - in_packs];
   }
-  void subtract(double l, const double* row) {
+  ENGRAM_INLINE void subtract(double l, const double* row) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] = nmadd(Pack(l), load_pack(row + i), p[i / kLanes]);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] = nmadd(l, row[i], x[i - in_packs]);
   }
-  void scale(double d) {
+  ENGRAM_INLINE void scale(double d) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] *= Pack(d);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] *= d;
   }

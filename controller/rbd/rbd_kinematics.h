@@ -32,14 +32,12 @@ template <class R, class S> struct RbdData {
 };
 
 // Rotation matrix of a unit quaternion (x y z w).
-template <class S> inline Mat3<S> rotation_of(const S* quat) {
+template <class S> ENGRAM_INLINE Mat3<S> rotation_of(const S* quat) {
   const S x = quat[0], y = quat[1], z = quat[2], w = quat[3];
   const S x2 = x + x, y2 = y + y, z2 = z + z;
-  Mat3<S> R;
-  R << nmadd(y, y2, nmadd(z, z2, S(1.0))), msub(x, y2, w * z2), madd(x, z2, w * y2),  //
-      madd(x, y2, w * z2), nmadd(x, x2, nmadd(z, z2, S(1.0))), msub(y, z2, w * x2),   //
-      msub(x, z2, w * y2), madd(y, z2, w * x2), nmadd(x, x2, nmadd(y, y2, S(1.0)));
-  return R;
+  return {{nmadd(y, y2, nmadd(z, z2, S(1.0))), madd(x, y2, w * z2), msub(x, z2, w * y2)},
+          {msub(x, y2, w * z2), nmadd(x, x2, nmadd(z, z2, S(1.0))), madd(y, z2, w * x2)},
+          {madd(x, z2, w * y2), msub(y, z2, w * x2), nmadd(x, x2, nmadd(y, y2, S(1.0)))}};
 }
 
 // q (nq) -> d.R_WJ, d.p_WJ, d.J
@@ -58,19 +56,18 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
       p_WJ = mul_add(R_WJ, Vec3<S>(qi[0], qi[1], qi[2]), p_WJ);
       R_WJ = matmul(R_WJ, rotation_of(qi + 3));
       for (int k = 0; k < 3; ++k) {
-        const Vec3<S> e = R_WJ.col(k);
+        const Vec3<S> e = R_WJ.column(k);
         J[k] = {e, Vec3<S>::Zero()};
         J[3 + k] = {cross(p_WJ, e), e};
       }
     } else if (R::kind[i] == kRevolute) {
       S s, c;
       sincos(qi[0], s, c);
-      const Vec3<S> x = R_WJ.col(0), y = R_WJ.col(1), z = R_WJ.col(2);
-      R_WJ.col(0) = madd<S>(x, c, y * s);
-      R_WJ.col(1) = madd<S>(y, c, x * -s);
+      const Vec3<S> x = R_WJ.column(0), y = R_WJ.column(1), z = R_WJ.column(2);
+      R_WJ = {madd(x, c, y * s), madd(y, c, x * -s), z};
       J[0] = {cross(p_WJ, z), z};
     } else {
-      const Vec3<S> z = R_WJ.col(2);
+      const Vec3<S> z = R_WJ.column(2);
       p_WJ = madd(z, qi[0], p_WJ);
       J[0] = {z, Vec3<S>::Zero()};
     }
@@ -80,7 +77,7 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
 }
 
 // m + sum_k J_k x_k over the dofs of joint i
-template <class R, class S> inline Motion<S> rbd_add_joint_motion(const RbdData<R, S>& d, int i, const S* x, Motion<S> m) {
+template <class R, class S> ENGRAM_INLINE Motion<S> rbd_add_joint_motion(const RbdData<R, S>& d, int i, const S* x, Motion<S> m) {
   for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) m = madd(d.J[k], x[k], m);
   return m;
 }
@@ -99,7 +96,9 @@ template <class R, class S> inline void rbd_inertias(RbdData<R, S>& d) {
 }
 
 // Acceleration of the world that stands in for gravity.
-template <class R, class S> inline Motion<S> rbd_gravity_acceleration() { return {-constant3<S>(R::gravity), Vec3<S>::Zero()}; }
+template <class R, class S> ENGRAM_INLINE Motion<S> rbd_gravity_acceleration() {
+  return {-constant3<S>(R::gravity), Vec3<S>::Zero()};
+}
 
 }  // namespace engram
 #endif  // CONTROLLER_RBD_RBD_KINEMATICS_H_
