@@ -26,7 +26,7 @@ template <class P, int N> void loop_merit(const Horizon<P, N>& h, Candidate<P>* 
   for (int first = 0; first < n; first += kLanes) {
     const Candidate<P>* c[kLanes];
     for (int l = 0; l < kLanes; ++l) c[l] = &candidates[first + l < n ? first + l : n - 1];
-    Pack x[P::nx], x_next[P::nx], u[P::nu], f[L::nxp], cost_k, cost = 0.0, gap = 0.0;
+    Pack x[P::nx], x_next[P::nx], u[P::nu] = {}, f[L::nxp], cost_k, cost = 0.0, gap = 0.0;
     for (int i = 0; i < P::nx; ++i) x_next[i] = h.x0[i];
     for (int k = 0; k <= h.n; ++k) {
       for (int i = 0; i < P::nx; ++i)
