@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / "bench" / "peers"))
+sys.path[:0] = [str(ROOT / "bench" / "peers"), str(ROOT / "codegen")]
 
 # The same formulas in another order of summation: what double precision leaves after one linearization or recursion.
 DERIVATIVE_TOLERANCE = 1e-9
@@ -246,6 +246,33 @@ class Bench:
             self.figures.add(robot, name, mine[name], best, holds, flops)
             self.figures.add(robot, f"{name}_lanes", mine[f"{name}_lanes"], best, holds, flops)
 
+    def queries(self) -> None:
+        """The memory: its tables beside scikit-learn, and one whole query."""
+        import queries
+        from threadpoolctl import threadpool_limits
+
+        from engram.paths import TABLES
+
+        program = self.ours.with_name("query_bench")
+        with threadpool_limits(1):
+            peer = queries.Peer(TABLES / "panda_reach")
+            near, between = peer.draw()
+            file = self.numbers("queries", np.hstack([near, between]))
+            holds = gate(
+                "queries, in units of their own", queries.errors(peer, run_json(program, "compare", file), near, between), 1.0
+            )
+            self.all_hold &= holds
+            mine = {name: Samples(np.array(us)) for name, us in run_json(program, "time", file, max(20, self.n // 10)).items()}
+            theirs = {
+                "knn": Samples(queries.one_by_one(peer.knn, near)),
+                "gpr": Samples(queries.one_by_one(peer.gpr, between)),
+            }
+        self.figures.title(
+            "query: the Panda's tables beside scikit-learn, one query at a time, and one whole query of the memory"
+        )
+        for name, samples in mine.items():
+            self.figures.add("query", name, samples, theirs.get(name), holds, None)
+
     def gemm(self) -> None:
         """The limit of arithmetic: the best rate of a matrix product, under our flags and under the machine's own."""
         mine, peer = alternate(1, [self.ours, "gemm", 50], [self.peers / "pinocchio_bench", "-", "gemm", 50])
@@ -271,6 +298,7 @@ def main() -> int:
     for name in args.only or PROBLEMS:
         bench.problem(name)
     bench.rigid_body("panda")
+    bench.queries()
     bench.gemm()
     out = args.build / "figures" / "bench.json"
     bench.figures.write(out)
