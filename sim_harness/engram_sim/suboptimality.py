@@ -1,7 +1,7 @@
 """How far the guess and the first iterations at a jump are from the best known solution of the same problem.
 
 The controller writes, for each jump, the problem (state, task vector) and the merit of its guess and after each iteration. J* is
-the lowest cost among what the controller itself reached there and what converges from a cold start, straight lines and detours.
+the lowest cost among what the controller itself reached there and what converges from straight lines and detours.
 """
 
 from concurrent.futures import ProcessPoolExecutor
@@ -58,7 +58,7 @@ def _start(robot: str, task: str) -> None:
 
 
 def best_cost(x0: np.ndarray, task: np.ndarray) -> float:
-    """Lowest converged cost of the problem from a cold start, straight lines and detours; infinite if none converges."""
+    """Lowest converged cost of the problem from straight lines and detours by way of home; infinite if none converges."""
     from engram.data.reach import detour
 
     nq = len(_solver.q_lo)
@@ -66,8 +66,7 @@ def best_cost(x0: np.ndarray, task: np.ndarray) -> float:
     starts = np.vstack([x0[:nq], rng.uniform(_solver.q_lo, _solver.q_hi, (IK_STARTS, nq))])
     ends = _solver.ends(task, starts)
     _solver.problem.set(x0, task)
-    cold = _solver.problem.hold()
-    guesses = [(cold["xs"], cold["us"])]
+    guesses = []
     if len(ends):
         lines = _solver.problem.line(ends)
         detours = _solver.problem.warp(detour(x0[:nq], _solver.spec.robot.q_home, ends, _solver.spec.knots), ends)

@@ -16,6 +16,7 @@ from engram.robots.spec import RobotSpec
 from engram.robots.tree import Tree
 
 SMALL_PART = 100  # triangles; smaller parts take the colour of the link's largest (MuJoCo refuses flat meshes)
+CELL = 0.006  # m, of the grid in which vertices are merged: a pixel of the video; software rendering takes half the time
 SAME_PLACE = 1e-6  # m: two readings of one mesh differ by the text precision of the file
 SAME_COUNT = 1e-3  # relative: coal's reader drops degenerate triangles
 
@@ -59,6 +60,7 @@ def load_visuals(spec: RobotSpec, tree: Tree) -> list[Visual]:
         else:
             for n, (vertices, triangles, rgba) in enumerate(_parts(shape)):
                 name = f"{shape.name}_{n}"
+                vertices, triangles = merged(vertices, triangles)
                 visuals.append(Visual(name, rgba=rgba, kind="mesh", vertices=vertices, triangles=triangles, **place))
     return visuals
 
@@ -68,6 +70,17 @@ def obj_text(visual: Visual) -> str:
     vertices = [f"v {x:.6f} {y:.6f} {z:.6f}" for x, y, z in visual.vertices]
     faces = [f"f {a} {b} {c}" for a, b, c in visual.triangles + 1]
     return "\n".join([*vertices, *faces]) + "\n"
+
+
+def merged(vertices: np.ndarray, triangles: np.ndarray, cell: float = CELL) -> tuple[np.ndarray, np.ndarray]:
+    """The mesh (n, 3) m, (m, 3) with the vertices of each grid cell merged into their mean; small meshes stay as they are."""
+    _, member = np.unique(np.floor(vertices / cell), axis=0, return_inverse=True)
+    member = member.ravel()
+    means = np.stack([np.bincount(member, column) for column in vertices.T], axis=1) / np.bincount(member)[:, None]
+    coarse = member[triangles]
+    coarse = coarse[(coarse[:, 0] != coarse[:, 1]) & (coarse[:, 1] != coarse[:, 2]) & (coarse[:, 2] != coarse[:, 0])]
+    _, first = np.unique(np.sort(coarse, axis=1), axis=0, return_index=True)
+    return (means, coarse[np.sort(first)]) if len(first) >= SMALL_PART else (vertices, triangles)
 
 
 def _parts(shape: pin.GeometryObject) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
