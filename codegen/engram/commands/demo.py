@@ -28,7 +28,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     parser.add_argument("--out", type=Path, help="folder to write (default: runs/<time>/)")
     parser.add_argument(
-        "--log-full", type=float, default=20.0, help="s of the log with every state, for `engram replay` (default: 20)"
+        "--log-full", type=float, default=10.0, help="s of the log with every state, for `engram replay` (default: 10)"
     )
     parser.add_argument("--video", type=float, default=30.0, help="s of video; 0: none (default: 30)")
     parser.add_argument(
