@@ -4,6 +4,7 @@
 
 #include "bench/counting.h"
 #include "bench/stopwatch.h"
+#include "codegen/offline/dense_model.h"
 #include "controller/fddp/fddp_solve.h"
 #include "controller/ocp/ocp_contact.h"
 
@@ -14,17 +15,13 @@
 
 namespace engram::bench {
 
+using ::bench::fail;
 using ::bench::Report;
 using ::bench::sample_us;
 
 constexpr double kStop = 1e-9;
 constexpr int kMaxIterations = 200;
 constexpr double kDisplacement = 1e-3;  // of the first state, in every tangent direction: what one control period sees
-
-[[noreturn]] inline void fail(const std::string& what) {
-  std::fprintf(stderr, "%s\n", what.c_str());
-  std::exit(1);
-}
 
 constexpr int kMaxKnots = 100;
 
@@ -35,52 +32,27 @@ template <class P> struct Problem {
   FddpStats stats;
 };
 
-// Entry i >= j of a knot's Hessian, padded indices.
-template <class Layout, bool free_base> double hessian(const KnotModel<Layout, free_base, double>& m, int i, int j) {
-  return m.Lzz[i][j];
-}
-template <class C> double hessian(const ContactKnotModel<C>& m, int i, int j) { return m.hessian(i, j); }
-
-// d q' / d z of a knot, nv x nz: E on q, plus dt G D.
-template <class P> Eigen::MatrixXd position_rows(const typename P::LqModel& m, double dt) {
-  using L = typename P::Layout;
-  Eigen::MatrixXd D(P::nv, P::nz);
-  for (int i = 0; i < P::nv; ++i)
-    for (int j = 0; j < P::nz; ++j) D(i, j) = m.D[i][padded_index<L>(j)];
-  Eigen::MatrixXd F = dt * D;
-  if constexpr (P::kFreeBase) F.topRows(6) = dt * (m.G * D.topRows(6));
-  F.leftCols(P::nv) += Eigen::MatrixXd::Identity(P::nv, P::nv);
-  if constexpr (P::kFreeBase) F.topLeftCorner(6, 6) += m.E - Eigen::MatrixXd::Identity(6, 6);
-  return F;
-}
-
 // Blocks of dense derivatives, row by row, as Crocoddyl stores them; nu = 0 at an impact.
 template <class P>
 void append_dense(const typename P::LqModel& m, double dt, bool terminal, int nu, double cost, std::vector<double> (&out)[8]) {
   using L = typename P::Layout;
+  constexpr int ndx = P::ndx;
   auto& [costs, Fx, Fu, Lx, Lu, Lxx, Lxu, Luu] = out;
-  const auto Lzz = [&](int i, int j) {
-    const int a = padded_index<L>(i), b = padded_index<L>(j);
-    return hessian(m, std::max(a, b), std::min(a, b));
-  };
   costs.push_back(cost);
-  for (int i = 0; i < P::ndx; ++i) {
+  for (int i = 0; i < ndx; ++i) {
     Lx.push_back(m.Lz[padded_index<L>(i)]);
-    for (int j = 0; j < P::ndx; ++j) Lxx.push_back(Lzz(i, j));
+    for (int j = 0; j < ndx; ++j) Lxx.push_back(offline::dense_hessian(m, i, j));
   }
   if (terminal) return;
-  const Eigen::MatrixXd Fq = position_rows<P>(m, dt);
-  for (int i = 0; i < P::ndx; ++i) {
-    const auto F = [&](int j) { return i < P::nv ? Fq(i, j) : m.D[i - P::nv][padded_index<L>(j)]; };
-    for (int j = 0; j < P::ndx; ++j) Fx.push_back(F(j));
-    for (int j = 0; j < nu; ++j) {
-      Fu.push_back(F(P::ndx + j));
-      Lxu.push_back(Lzz(i, P::ndx + j));
-    }
-  }
+  double Fx_k[ndx * ndx], Fu_k[ndx * P::nu];
+  offline::dense_dynamics<P>(m, dt, Fx_k, Fu_k);
+  Fx.insert(Fx.end(), Fx_k, Fx_k + ndx * ndx);
+  Fu.insert(Fu.end(), Fu_k, Fu_k + ndx * nu);
+  for (int i = 0; i < ndx; ++i)
+    for (int j = 0; j < nu; ++j) Lxu.push_back(offline::dense_hessian(m, i, ndx + j));
   for (int i = 0; i < nu; ++i) {
     Lu.push_back(m.Lz[L::ou + i]);
-    for (int j = 0; j < nu; ++j) Luu.push_back(Lzz(P::ndx + i, P::ndx + j));
+    for (int j = 0; j < nu; ++j) Luu.push_back(offline::dense_hessian(m, ndx + i, ndx + j));
   }
 }
 

@@ -36,15 +36,17 @@ template <class F> std::vector<double> sample_us(int n, F&& f, double batch = 1)
 // Keeps a result alive without storing it.
 template <class T> inline void keep(const T& value) { asm volatile("" : : "g"(&value) : "memory"); }
 
+[[noreturn]] inline void fail(const std::string& what) {
+  std::fprintf(stderr, "%s\n", what.c_str());
+  std::exit(1);
+}
+
 // Whitespace-separated numbers of a text file; ends the program if there are none.
 inline std::vector<double> read_numbers(const char* path) {
   std::ifstream file(path);
   std::vector<double> numbers;
   for (double number; file >> number;) numbers.push_back(number);
-  if (numbers.empty()) {
-    std::fprintf(stderr, "%s: no numbers\n", path);
-    std::exit(1);
-  }
+  if (numbers.empty()) fail(std::string(path) + ": no numbers");
   return numbers;
 }
 
