@@ -10,6 +10,7 @@ from typing import Any
 
 from engram.inputs import InputError
 from engram.paths import ROOT, relative
+from engram.tasks.scene import write_shown_scene
 from engram.tasks.spec import load_task
 from engram_sim import report, suboptimality, video
 from engram_sim.motion import Motion
@@ -51,9 +52,7 @@ def demo(args: argparse.Namespace) -> int:
     runs = [read_run(mode, folder / mode) for mode in done]
     drawn = None
     if args.video > 0:
-        drawn = video.render(
-            runs, video.shown_scene(args.robot, args.task), folder / "demo.mp4", spec.frame, args.video, args.jobs
-        )
+        drawn = video.render(runs, write_shown_scene(spec), folder / "demo.mp4", spec.frame, args.video, args.jobs)
     finish(folder, runs, header, drawn, time.monotonic() - start, args.figures)
     return 0 if len(done) == len(modes) and all(code == 0 for code in codes.values()) else 1
 
@@ -171,8 +170,6 @@ def render_again(folder: Path, seconds: float, modes: str | None, jobs: int, out
     if not runs:
         raise InputError(f"--modes {modes}: the run has none of them")
     spec = load_task(header["robot"], header["task"])
-    path = video.render(
-        runs, video.shown_scene(header["robot"], header["task"]), out or folder / "demo.mp4", spec.frame, seconds, jobs
-    )
+    path = video.render(runs, write_shown_scene(spec), out or folder / "demo.mp4", spec.frame, seconds, jobs)
     print(f"video   {relative(path)}" if path else "render: no jump was finished by all modes; nothing to show")
     return 0 if path else 1

@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from engram.inputs import InputError
-from engram.paths import BUILD, relative
+from engram.paths import relative
 from engram_sim.pair import Progress, program, stop
 from engram_sim.results import Run
 
@@ -59,16 +59,6 @@ def clip_line(runs: list[Run], title: str, n: int, move: bool) -> str:
             outcome = f"ok  {jump['arrival_s']:.2f} s" if jump["success"] else jump["reason"].replace("+", ", ")
             fields += [f"{jump['t_start_s']:.3f}", f"{jump['t_end_s']:.3f}", outcome]
     return ";".join(fields)
-
-
-def shown_scene(robot: str, task: str) -> Path:
-    """The scene with the robot's meshes if it was built, else the plant's own. Raises InputError if neither is there."""
-    from engram_sim.pair import scene
-
-    for path in (BUILD / "scene" / f"{robot}_{task}.xml", scene(robot, task)):
-        if path.is_file():
-            return path
-    raise InputError(f"no scene of {robot} {task}; write it by: engram task {robot} {task} --meshes")
 
 
 def render(runs: list[Run], scene: Path, out: Path, hand: str, seconds: float = 30.0, jobs: int = 2) -> Path | None:

@@ -25,10 +25,8 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> int:
     """Write task.h and scene.xml; with --meshes also the scene that shows the robot's meshes."""
-    from engram.robots.shown import write_shown
-    from engram.robots.spec import read_spec
     from engram.tasks.emit_header import task_header
-    from engram.tasks.scene import scene_mjcf
+    from engram.tasks.scene import scene_mjcf, write_shown_scene
     from engram.tasks.spec import load_task
 
     spec = load_task(args.robot, args.task, args.models)
@@ -41,8 +39,5 @@ def run(args: argparse.Namespace) -> int:
     sizes = f"vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}"
     print(f"task:   {relative(folder)}/task.h scene.xml  {sizes}  digest {spec.digest:016x}")
     if args.meshes:
-        robot = write_shown(read_spec(args.robot, args.models), spec.robot, args.build)
-        path = robot.parent / f"{args.robot}_{args.task}.xml"
-        path.write_text(scene_mjcf(spec, robot, world, path.parent), encoding="utf-8")
-        print(f"task:   {relative(path)}")
+        print(f"task:   {relative(write_shown_scene(spec, args.models, args.build))}")
     return 0
