@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from engram.emit import write_tables
+from engram.inputs import InputError
 from engram.learn.bow import fit_bow_code
-from engram.learn.dataset import rotation
+from engram.learn.dataset import FEWEST, load_motions, rotation
 from engram.learn.gpr import fit_gpr, fit_hyperparameters, round_digits
 from engram.learn.memory import Memory, Motions, Settings, features, fit_memory
 from engram.learn.reproducible import PINNED, pinned
@@ -169,3 +171,62 @@ def test_a_process_pins_itself_before_numpy_is_loaded() -> None:
     environment = {key: value for key, value in os.environ.items() if key not in PINNED}
     done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
     assert done.stdout == "True\n" and pinned() == all(os.environ.get(k) == v for k, v in PINNED.items())
+
+
+SPEC = SimpleNamespace(name="reach", digest=77, vector_name=list("xyzabcd"), robot=SimpleNamespace(name="panda", nq=7, nv=7))
+
+
+def data_set(n: int = FEWEST) -> dict[str, np.ndarray]:
+    """Arrays as `engram data` writes them, at random."""
+    rng = np.random.default_rng(8)
+    return {
+        "X": rng.normal(size=(n, 14)),
+        "xs": rng.normal(size=(n, 51, 14)),
+        "us": rng.normal(size=(n, 50, 7)),
+        "cost": np.ones(n),
+        "t": TIMES,
+        "task_digest": np.uint64(77),
+        "made_from": np.array("a test"),
+    }
+
+
+def test_a_data_set_is_read_and_split(tmp_path: Path) -> None:
+    data = data_set()
+    np.savez(tmp_path / "d.npz", **data)
+    source = load_motions(tmp_path / "d.npz", SPEC, 10)
+    assert source.motions.x.shape == (FEWEST, 16) and source.motions.held_out.sum() == FEWEST // 10
+    assert source.made_from == "a test" and source.vector.shape == (FEWEST, 7)
+    np.savez(tmp_path / "again.npz", **data)
+    assert load_motions(tmp_path / "again.npz", SPEC, 10).digest == source.digest
+    data["us"][3, 2, 1] += 1e-9
+    np.savez(tmp_path / "other.npz", **data)
+    assert load_motions(tmp_path / "other.npz", SPEC, 10).digest != source.digest
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (lambda d: d.update(task_digest=np.uint64(5)), "made for another task: its digest is 0x0000000000000005"),
+        (lambda d: d.pop("us"), "cannot be read"),
+        (lambda d: d.update(X=d["X"][:5], xs=d["xs"][:5], us=d["us"][:5]), "holds 5 motions, at least 50 are needed"),
+        (lambda d: d.update(us=d["us"][:, :-1]), "its arrays do not fit together"),
+        (lambda d: d["xs"].__setitem__((0, 0, 0), np.nan), "its arrays do not fit together"),
+    ],
+)
+def test_a_bad_data_set_is_refused_with_its_mend(tmp_path: Path, change, text: str) -> None:
+    data = data_set()
+    change(data)
+    np.savez(tmp_path / "d.npz", **data)
+    with pytest.raises(InputError, match=text) as error:
+        load_motions(tmp_path / "d.npz", SPEC, 10)
+    assert "run `engram data panda reach`" in str(error.value)
+
+
+def test_a_missing_or_cut_data_set_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="cannot be read"):
+        load_motions(tmp_path / "none.npz", SPEC, 10)
+    np.savez(tmp_path / "d.npz", **data_set())
+    whole = (tmp_path / "d.npz").read_bytes()
+    (tmp_path / "d.npz").write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="cannot be read"):
+        load_motions(tmp_path / "d.npz", SPEC, 10)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -48,7 +49,7 @@ def load_motions(path: Path, spec: TaskSpec, held_out: int) -> Source:
             data = dict(file)
         X, xs, us, t = (np.asarray(data[key], float) for key in ("X", "xs", "us", "t"))
         digest, made_from, cost = int(data["task_digest"]), str(data["made_from"]), np.asarray(data["cost"], float)
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
         raise InputError(f"{relative(path)}: cannot be read ({error}); {mend}") from None
     nq = spec.robot.nq
     if digest != spec.digest:
