@@ -184,7 +184,7 @@ TEST(OcpObstacles, BoxDistanceHasItsGradient) {
     EXPECT_NEAR(g.norm(), 1.0, 1e-12);
     // one step along the gradient raises the distance by the step, except across an edge of the medial axis
     if (d > 1e-3) {
-      const Vec3<double> q = p + 1e-3 * g;
+      const Vec3<double> step = 1e-3 * g, q = p + step;
       EXPECT_NEAR(BoxField<OneBox>::distance(0, q, ignored), d + 1e-3, 1e-12);
     }
   }
