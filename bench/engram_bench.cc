@@ -70,7 +70,7 @@ template <class R, class S> struct RigidBody {
   }
   void aba_derivatives() {
     rbd_forward_dynamics(q, v, tau, d, out);
-    rbd_forward_derivatives(q, v, tau, d, out, A, B, C);
+    rbd_forward_derivatives(d, out, A, B, C);
   }
 };
 

@@ -148,7 +148,7 @@ template <class R> class Robot {
       load(v.data(), n, nv, i, y);
       load(tau.data(), n, nv, i, z);
       rbd_forward_dynamics(x, y, z, d, a);
-      rbd_forward_derivatives(x, y, z, d, a, da_dq, da_dv, Minv);
+      rbd_forward_derivatives(d, a, da_dq, da_dv, Minv);
       store(da_dq.data(), nv * nv, n, i, dq.data());
       store(da_dv.data(), nv * nv, n, i, dv.data());
       store(Minv.data(), nv * nv, n, i, dtau.data());

@@ -80,7 +80,7 @@ template <class R_, class... Terms> struct Ocp {
     S a[nv];
     Mat<S, nv, nv> da_dq, da_dv, Minv;
     forward(x, u, d, a);
-    rbd_forward_derivatives<R>(x, x + nq, u, d, a, da_dq, da_dv, Minv);
+    rbd_forward_derivatives<R>(d, a, da_dq, da_dv, Minv);
     for (int i = 0; i < nv; ++i) {
       for (int j = 0; j < Layout::nzp; ++j) M.D[i][j] = 0.0;
       for (int j = 0; j < nv; ++j) {

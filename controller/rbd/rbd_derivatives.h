@@ -111,8 +111,7 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
 
 // d a / d q, d a / d v and M^-1 = d a / d tau (nv x nv each):  d a = M^-1 (d tau - dtau_dq dq - dtau_dv dv).
 // Call right after rbd_forward_dynamics(q, v, tau, d, a); overwrites d.A and d.f with their values at a. No heap; cannot fail.
-template <class R, class S> inline void rbd_forward_derivatives(const S* /*q*/, const S* /*v*/, const S* /*tau*/,
-                                                                RbdData<R, S>& d, const S* a, Mat<S, R::nv, R::nv>& da_dq,
+template <class R, class S> inline void rbd_forward_derivatives(RbdData<R, S>& d, const S* a, Mat<S, R::nv, R::nv>& da_dq,
                                                                 Mat<S, R::nv, R::nv>& da_dv, Mat<S, R::nv, R::nv>& Minv) {
   // accelerations and forces are affine in a: add J a and Y J a
   Motion<S> dA[R::nj];

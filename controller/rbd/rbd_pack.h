@@ -23,6 +23,9 @@ namespace engram {
 #define ENGRAM_LANES 4
 #endif
 inline constexpr int kLanes = ENGRAM_LANES;
+#if defined(__x86_64__) && ENGRAM_LANES == 8 && !defined(__AVX512F__)
+#error "eight lanes need AVX-512: without it they spill out of the registers and run ten times slower"
+#endif
 
 struct Pack {
   typedef double Lanes __attribute__((vector_size(kLanes * sizeof(double))));

@@ -36,12 +36,18 @@ template <class S> struct Vec3 : Eigen::Matrix<S, 3, 1> {
     Base::operator=(o);
     return *this;
   }
-  ENGRAM_INLINE Vec3& operator+=(const Vec3& b) { return *this = *this + b; }
-  ENGRAM_INLINE friend Vec3 operator+(const Vec3& a, const Vec3& b) { return {a[0] + b[0], a[1] + b[1], a[2] + b[2]}; }
-  ENGRAM_INLINE friend Vec3 operator-(const Vec3& a, const Vec3& b) { return {a[0] - b[0], a[1] - b[1], a[2] - b[2]}; }
-  ENGRAM_INLINE friend Vec3 operator-(const Vec3& a) { return {-a[0], -a[1], -a[2]}; }
-  ENGRAM_INLINE friend Vec3 operator*(const Vec3& a, S s) { return {a[0] * s, a[1] * s, a[2] * s}; }
+  ENGRAM_INLINE Vec3& operator+=(const Vec3& b) { return *this = {(*this)[0] + b[0], (*this)[1] + b[1], (*this)[2] + b[2]}; }
 };
+
+// For two of these only: mixed with Eigen's expressions, Eigen's operators hold.
+template <class S> ENGRAM_INLINE Vec3<S> operator+(const Vec3<S>& a, const Vec3<S>& b) {
+  return {a[0] + b[0], a[1] + b[1], a[2] + b[2]};
+}
+template <class S> ENGRAM_INLINE Vec3<S> operator-(const Vec3<S>& a, const Vec3<S>& b) {
+  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
+}
+template <class S> ENGRAM_INLINE Vec3<S> operator-(const Vec3<S>& a) { return {-a[0], -a[1], -a[2]}; }
+template <class S> ENGRAM_INLINE Vec3<S> operator*(const Vec3<S>& a, const S& s) { return {a[0] * s, a[1] * s, a[2] * s}; }
 
 template <class S> struct Mat3 : Eigen::Matrix<S, 3, 3> {
   using Base = Eigen::Matrix<S, 3, 3>;
@@ -62,6 +68,12 @@ template <class S> struct Mat3 : Eigen::Matrix<S, 3, 3> {
   }
   template <class D> ENGRAM_INLINE Mat3& operator=(const Eigen::MatrixBase<D>& o) {
     Base::operator=(o);
+    return *this;
+  }
+  ENGRAM_INLINE Mat3& operator+=(const Mat3& b) {
+    set_column(0, column(0) + b.column(0));
+    set_column(1, column(1) + b.column(1));
+    set_column(2, column(2) + b.column(2));
     return *this;
   }
   ENGRAM_INLINE Vec3<S> column(int j) const { return {(*this)(0, j), (*this)(1, j), (*this)(2, j)}; }

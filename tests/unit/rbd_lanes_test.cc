@@ -32,7 +32,7 @@ template <class R, class S> struct Outcome {
     rbd_aba<R>(q, v, u, d, aba);
     rbd_crba<R>(d, M);
     rbd_forward_dynamics<R>(q, v, u, d, forward);
-    rbd_forward_derivatives<R>(q, v, u, d, forward, da_dq, da_dv, Minv);
+    rbd_forward_derivatives<R>(d, forward, da_dq, da_dv, Minv);
     rbd_gravity<R>(d, gravity);
     rbd_gravity_derivatives<R>(d, dg_dq);
     rbd_integrate<R>(q, v, q_next);
