@@ -111,7 +111,7 @@ template <class P, int N> struct FddpWork {
   alignas(64) double Q[L::nzp][L::nzp], Qz[L::nzp];
   alignas(64) double Vxx[L::nxp][L::nxp], Vx[L::nxp];
   alignas(64) double Vvq[P::nv][padded(P::nv)], Vvv[P::nv][padded(P::nv)], Vqq[P::nv][padded(P::nv)];
-  alignas(64) double W[P::nv][L::nzp], B[P::nv][padded(P::nv)];
+  alignas(64) double W[P::nv][L::nzp], GV[6][L::nxp];
   alignas(64) double Luu[L::nup][L::nup], Y[P::nu][L::nxp];
 };
 

@@ -19,58 +19,60 @@
 
 namespace engram {
 
-// M <- T' M: rows of the base block (6 x 6 T) of a matrix of n columns.
-inline void base_rows(const Mat<double, 6, 6>& T, double* M, int ld, int n) {
-  for (int j = 0; j < n; ++j) {
-    double c[6];
-    for (int i = 0; i < 6; ++i) {
-      c[i] = 0.0;
-      for (int k = 0; k < 6; ++k) c[i] += T(k, i) * M[k * ld + j];
-    }
-    for (int i = 0; i < 6; ++i) M[i * ld + j] = c[i];
+// Products with the base block T (6 x 6) of the integrator, of rows that start at a vector boundary: the columns beyond 6 of a vector
+// pass through an identity.
+class BaseColumns {
+ public:
+  explicit BaseColumns(const Mat<double, 6, 6>& T) {
+    for (int i = 0; i < kWidth; ++i)
+      for (int j = 0; j < kWidth; ++j) T_[i][j] = i < 6 && j < 6 ? T(i, j) : i == j ? 1.0 : 0.0;
   }
+  // row <- row T
+  void apply(double* row) const {
+    kernel::Vector c[kWidth / kVector] = {};
+    for (int k = 0; k < kWidth; ++k)
+      for (int j = 0; j < kWidth / kVector; ++j) c[j] += row[k] * kernel::vec(T_[k] + j * kVector);
+    for (int j = 0; j < kWidth / kVector; ++j) kernel::vec(row + j * kVector) = c[j];
+  }
+
+ private:
+  static constexpr int kWidth = 8;
+  alignas(64) double T_[kWidth][kWidth];
+};
+
+// out (6 rows of n, apart) = T' M for the first 6 rows of M.
+template <int n> inline void base_rows(const Mat<double, 6, 6>& T, const double* M, int ldm, double* out, int ldo) {
+  double columns[6][6];
+  for (int k = 0; k < 6; ++k)
+    for (int i = 0; i < 6; ++i) columns[k][i] = T(k, i);
+  kernel::product<6, n, 6, kernel::Sign::kPlus, kernel::Start::kSet>(&columns[0][0], 6, M, ldm, out, ldo);
 }
 
-// M <- M T: columns of the base block of a matrix of m rows.
-inline void base_columns(const Mat<double, 6, 6>& T, double* M, int ld, int m) {
-  for (int i = 0; i < m; ++i) {
-    double r[6];
-    for (int j = 0; j < 6; ++j) {
-      r[j] = 0.0;
-      for (int k = 0; k < 6; ++k) r[j] += M[i * ld + k] * T(k, j);
-    }
-    for (int j = 0; j < 6; ++j) M[i * ld + j] = r[j];
-  }
-}
-
-// The value function (w.Vxx, w.Vx) of the next knot in the coordinates (dq, dv'): fills w.Vqq, w.Vvq, w.Vvv and changes w.Vx.
+// The value function (w.Vxx, w.Vx) of the next knot in the coordinates (dq, dv'): fills w.Vqq (lower), w.Vvq, w.Vvv and changes w.Vx.
 template <class P, int N> void value_before_integrator(const typename FddpWork<P, N>::Model& m, double dt, FddpWork<P, N>& w) {
   using L = typename P::Layout;
-  constexpr int nv = P::nv, nvp = padded(nv), ov = L::ov;
-  for (int i = 0; i < nv; ++i) {
-    std::memcpy(w.Vqq[i], w.Vxx[i], nvp * sizeof(double));           // Vqq
-    std::memcpy(w.Vvv[i], w.Vxx[ov + i] + ov, nvp * sizeof(double));  // Vvv
-    std::memcpy(w.B[i], w.Vxx[i] + ov, nvp * sizeof(double));         // Vqv
-    std::memcpy(w.Vvq[i], w.Vxx[ov + i], nvp * sizeof(double));       // Vvq
-  }
+  constexpr int nv = P::nv, nvp = padded(nv), ov = L::ov, nxp = L::nxp;
+  using kernel::vec;
   if constexpr (P::kFreeBase) {
-    base_rows(m.G, &w.Vqq[0][0], nvp, nvp);  // G' Vqq
-    base_rows(m.G, &w.B[0][0], nvp, nvp);    // G' Vqv
-  }
-  for (int i = 0; i < nv; ++i)
-    for (int j = 0; j < nvp; ++j) {
-      w.Vvq[i][j] += dt * w.Vqq[i][j];  // dt G' Vqq + Vvq
-      w.Vvv[i][j] += dt * w.B[i][j];    // Vvv + dt G' Vqv
+    const BaseColumns E(m.E), G(m.G);
+    base_rows<nxp>(m.G, &w.Vxx[0][0], nxp, &w.GV[0][0], nxp);  // G' (Vqq Vqv)
+    for (int i = 0; i < nv; ++i) {
+      const double* const q = i < 6 ? w.GV[i] : w.Vxx[i];
+      double *const vq = w.Vvq[i], *const vv = w.Vvv[i];
+      for (int j = 0; j < nvp; j += kVector) {
+        vec(vq + j) = vec(w.Vxx[ov + i] + j) + dt * vec(q + j);            // Vvq + dt G' Vqq
+        vec(vv + j) = vec(w.Vxx[ov + i] + ov + j) + dt * vec(q + ov + j);  // Vvv + dt G' Vqv
+      }
+      alignas(64) double head[8];  // + dt (dt G' Vqq + Vvq) G
+      std::memcpy(head, vq, sizeof(head));
+      G.apply(head);
+      for (int j = 0; j < 8; j += kVector) vec(vv + j) += dt * vec(head + j);
+      for (int j = 8; j < nvp; j += kVector) vec(vv + j) += dt * vec(vq + j);
+      E.apply(vq);
     }
-  if constexpr (P::kFreeBase) {  // + dt (dt G' Vqq + Vvq) G, then Vvq E and E' Vqq E
-    std::memcpy(w.B, w.Vvq, sizeof(w.B));
-    base_columns(m.G, &w.B[0][0], nvp, nv);
-    for (int i = 0; i < nv; ++i)
-      for (int j = 0; j < nvp; ++j) w.Vvv[i][j] += dt * w.B[i][j];
-    base_columns(m.E, &w.Vvq[0][0], nvp, nv);
-    for (int i = 0; i < nv; ++i) std::memcpy(w.Vqq[i], w.Vxx[i], nvp * sizeof(double));
-    base_rows(m.E, &w.Vqq[0][0], nvp, nvp);
-    base_columns(m.E, &w.Vqq[0][0], nvp, nv);
+    base_rows<nvp>(m.E, &w.Vxx[0][0], nxp, &w.Vqq[0][0], nvp);  // E' Vqq E
+    for (int i = 6; i < nv; ++i) std::memcpy(w.Vqq[i], w.Vxx[i], nvp * sizeof(double));
+    for (int i = 0; i < nv; ++i) E.apply(w.Vqq[i]);
     double g[6], e[6];
     for (int i = 0; i < 6; ++i) {
       g[i] = e[i] = 0.0;
@@ -83,7 +85,11 @@ template <class P, int N> void value_before_integrator(const typename FddpWork<P
     for (int i = 0; i < 6; ++i) w.Vx[i] = e[i];
   } else {
     for (int i = 0; i < nv; ++i)
-      for (int j = 0; j < nvp; ++j) w.Vvv[i][j] += dt * w.Vvq[i][j];
+      for (int j = 0; j < nvp; j += kVector) {
+        vec(w.Vqq[i] + j) = vec(w.Vxx[i] + j);
+        vec(w.Vvq[i] + j) = vec(w.Vxx[ov + i] + j) + dt * vec(w.Vxx[i] + j);
+        vec(w.Vvv[i] + j) = vec(w.Vxx[ov + i] + ov + j) + dt * vec(w.Vxx[i] + ov + j) + dt * vec(w.Vvq[i] + j);
+      }
     for (int i = 0; i < nv; ++i) w.Vx[ov + i] += dt * w.Vx[i];
   }
 }
@@ -91,22 +97,32 @@ template <class P, int N> void value_before_integrator(const typename FddpWork<P
 // Qzz (lower) and Qz of a knot from its model and the value function in (dq, dv').
 template <class P, int N> void action_value(const typename FddpWork<P, N>::Model& m, FddpWork<P, N>& w) {
   using L = typename P::Layout;
+  using kernel::Sign;
+  using kernel::Start;
+  using kernel::vec;
   constexpr int nv = P::nv, nvp = padded(nv), nzp = L::nzp, ov = L::ov;
-  std::memset(w.W, 0, sizeof(w.W));
-  kernel::product<nv, nzp, nv>(&w.Vvv[0][0], nvp, &m.D[0][0], nzp, &w.W[0][0], nzp);  // W = Vvv~ D
+  kernel::product<nv, nzp, nv, Sign::kPlus, Start::kSet>(&w.Vvv[0][0], nvp, &m.D[0][0], nzp, &w.W[0][0], nzp);  // W = Vvv~ D
   for (int i = 0; i < nv; ++i)
-    for (int j = 0; j < nvp; ++j) {
-      const double half = 0.5 * w.W[i][j];
-      w.W[i][j] += w.Vvq[i][j];    // W = Vvv~ D + [Vvq~ 0], for the rows v and u of Qzz
-      w.Vvq[i][j] += half;         // 1/2 Vvv~ Dq + Vvq~, for its block qq
+    for (int j = 0; j < nvp; j += kVector) {
+      const kernel::Vector half = 0.5 * vec(w.W[i] + j);
+      vec(w.W[i] + j) += vec(w.Vvq[i] + j);  // W = Vvv~ D + [Vvq~ 0], for the rows v and u of Qzz
+      vec(w.Vvq[i] + j) += half;             // 1/2 Vvv~ Dq + Vvq~, for its block qq
     }
-  std::memset(w.B, 0, sizeof(w.B));
-  kernel::product<nv, nvp, nv>(&m.D[0][0], nzp, &w.Vvq[0][0], nvp, &w.B[0][0], nvp);  // B = Dq' (1/2 Vvv~ Dq + Vvq~)
-  copy_hessian(m, nzp, w.Q);
+  // block qq: Hessian + Vqq~ + Dq' (1/2 Vvv~ Dq + Vvq~) + (1/2 Vvv~ Dq + Vvq~)' Dq
+  copy_hessian_qq(m, w.Q);
   for (int i = 0; i < nv; ++i)
-    for (int j = 0; j <= i; ++j) w.Q[i][j] += w.Vqq[i][j] + (w.B[i][j] + w.B[j][i]);
-  kernel::product_lower<nzp, nv, kernel::Sign::kPlus, ov>(&m.D[0][0], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
-  if constexpr (P::kPhases) add_force_hessian<P, N>(m, w);
+    for (int j = 0; j <= i; j += kVector) vec(w.Q[i] + j) += vec(w.Vqq[i] + j);
+  kernel::product_lower<nv, nv>(&m.D[0][0], nzp, &w.Vvq[0][0], nvp, &w.Q[0][0], nzp);
+  kernel::product_lower<nv, nv>(&w.Vvq[0][0], nvp, &m.D[0][0], nzp, &w.Q[0][0], nzp);
+  // rows v and u: Hessian + D' W
+  if constexpr (kDiagonalHessian<typename FddpWork<P, N>::Model>) {
+    kernel::product_lower<nzp, nv, Sign::kPlus, ov, Start::kSet>(&m.D[0][0], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
+    for (int i = ov; i < nzp; ++i) w.Q[i][i] += m.h[i];
+    add_force_hessian<P, N>(m, w);
+  } else {
+    for (int i = ov; i < nzp; ++i) std::memcpy(w.Q[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+    kernel::product_lower<nzp, nv, Sign::kPlus, ov>(&m.D[0][0], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
+  }
   std::memcpy(w.Qz, m.Lz, sizeof(w.Qz));
   for (int i = 0; i < nv; ++i) w.Qz[i] += w.Vx[i];
   kernel::product_vector<nzp, nv>(&m.D[0][0], nzp, w.Vx + ov, w.Qz);
@@ -134,19 +150,12 @@ template <class P, int N> bool gains(int k, const FddpOpts& opts, FddpWork<P, N>
     }
   } else {
     if (!kernel::cholesky<nu>(&w.Luu[0][0], nup, inv)) return false;
-    double y[nup];
-    for (int i = 0; i < nu; ++i) {  // y = L^-1 Qu
-      y[i] = Qu[i];
-      for (int j = 0; j < i; ++j) y[i] -= w.Luu[i][j] * y[j];
-      y[i] *= inv[i];
-      gain1 += y[i] * y[i];
-    }
+    double* const y = w.k[k];  // k = L^-T L^-1 Qu
+    std::memcpy(y, Qu, nup * sizeof(double));
+    kernel::solve_lower_vector<nu>(&w.Luu[0][0], nup, inv, y);
+    for (int i = 0; i < nu; ++i) gain1 += y[i] * y[i];
     gain2 = gain1;
-    for (int i = nu - 1; i >= 0; --i) {  // k = L^-T y
-      for (int j = i + 1; j < nu; ++j) y[i] -= w.Luu[j][i] * y[j];
-      y[i] *= inv[i];
-      w.k[k][i] = y[i];
-    }
+    kernel::solve_lower_transposed_vector<nu>(&w.Luu[0][0], nup, inv, y);
   }
   kernel::product_vector<nxp, nu, kernel::Sign::kMinus>(w.Q[ou], L::nzp, w.k[k], w.Qz);  // Vx = Qx - Qxu k
   kernel::solve_lower<nu, nxp>(&w.Luu[0][0], nup, inv, &w.Y[0][0], nxp);                // Y = L^-1 Qux
@@ -181,9 +190,8 @@ template <class P, int N> void close_value(FddpWork<P, N>& w) {
 // Fills w.k, w.Vf, w.dg, w.dq and s.K. False if the regularization is too small for a descent direction.
 template <class P, int N>
 bool fddp_backward(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s) {
-  using L = typename P::Layout;
   w.dg = w.dq = 0.0;
-  copy_hessian(w.model[h.n], L::nxp, w.Vxx);
+  copy_hessian_x(w.model[h.n], w.Vxx);
   std::memcpy(w.Vx, w.model[h.n].Lz, sizeof(w.Vx));
   close_value(w);
   for (int k = h.n - 1; k >= 0; --k) {

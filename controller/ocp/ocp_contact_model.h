@@ -44,15 +44,19 @@ template <class C> struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Rob
   }
 };
 
-// The first n rows of a knot's Hessian but for F' H F, lower triangle up to the padding, into rows of ld.
-template <class C, int ld> inline void copy_hessian(const ContactKnotModel<C>& m, int n, double (*to)[ld]) {
+// The stored Hessian, as for a knot without contacts: block qq, and all blocks of the state.
+template <class C, int ld> inline void copy_hessian_qq(const ContactKnotModel<C>& m, double (*to)[ld]) {
+  for (int i = 0; i < C::Robot::nv; ++i) std::memcpy(to[i], m.Hqq[i], padded(i + 1) * sizeof(double));
+}
+template <class C, int ld> inline void copy_hessian_x(const ContactKnotModel<C>& m, double (*to)[ld]) {
   constexpr int nv = C::Robot::nv;
-  for (int i = 0; i < n; ++i) {
+  copy_hessian_qq(m, to);
+  for (int i = nv; i < LayoutOf<typename C::Robot>::nxp; ++i) {
     std::memset(to[i], 0, padded(i + 1) * sizeof(double));
-    if (i < nv) std::memcpy(to[i], m.Hqq[i], (i + 1) * sizeof(double));
-    else to[i][i] = m.h[i];
+    to[i][i] = m.h[i];
   }
 }
+template <class C> inline constexpr bool kDiagonalHessian<ContactKnotModel<C>> = true;
 
 // Calls f(c) for every contact of C, active or not, c a compile-time constant.
 template <class C, class F, int... c> inline void for_contact(F f, std::integer_sequence<int, c...>) {
@@ -166,7 +170,7 @@ template <class C> inline void contact_finish_costs(const ContactLanes<C, Pack>&
     m.h[i] = i < nv ? 0.0 : in.cost.Lzz[i][i].l[lane];
   }
   for (int i = 0; i < nv; ++i)
-    for (int j = 0; j <= i; ++j) m.Hqq[i][j] = in.cost.Lzz[i][j].l[lane];
+    for (int j = 0; j < padded(i + 1); ++j) m.Hqq[i][j] = j <= i ? in.cost.Lzz[i][j].l[lane] : 0.0;
   m.forces = 0;
   for (int c = 0; c < C::n; ++c) {
     if (!contact_active(active, c)) continue;

@@ -49,11 +49,15 @@ template <class Layout, bool free_base, class S> struct KnotModel : BaseBlock<fr
   alignas(64) S Lzz[Layout::nzp][Layout::nzp];  // Gauss-Newton Hessian, lower triangle        (nz x nz)
 };
 
-// The first n rows of a knot's Hessian, lower triangle up to the padding, into rows of ld.
-template <class Layout, bool free_base, int ld>
-inline void copy_hessian(const KnotModel<Layout, free_base, double>& m, int n, double (*to)[ld]) {
-  for (int i = 0; i < n; ++i) std::memcpy(to[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+// Block qq of a knot's Hessian, lower triangle up to the padding, into rows of ld; all blocks of the state likewise.
+template <class Layout, bool free_base, int ld> inline void copy_hessian_qq(const KnotModel<Layout, free_base, double>& m, double (*to)[ld]) {
+  for (int i = 0; i < Layout::nv; ++i) std::memcpy(to[i], m.Lzz[i], padded(i + 1) * sizeof(double));
 }
+template <class Layout, bool free_base, int ld> inline void copy_hessian_x(const KnotModel<Layout, free_base, double>& m, double (*to)[ld]) {
+  for (int i = 0; i < Layout::nxp; ++i) std::memcpy(to[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+}
+// True for a model whose stored Hessian is block qq and a diagonal.
+template <class Model> inline constexpr bool kDiagonalHessian = false;
 
 // Where coordinate i of dz = (dq, dv, du) stands in a padded vector.
 template <class Layout> constexpr int padded_index(int i) {
