@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct PandaReach {
   using Robot = robots::Panda;
   static constexpr char name[] = "panda_reach";
-  static constexpr uint64_t digest = 0x916d3ad21e46c324;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x38fe5887135666de;  // of the numbers below and of the robot's
   static constexpr Robot::Frame frame = Robot::kHandTcp;  // shall reach the target
 
   // task vector, in the order of task_t.value
@@ -40,7 +40,7 @@ struct PandaReach {
 
   // horizon
   static constexpr int nknots = 50;
-  static constexpr double dt = 0x1.eb851eb851eb8p-6;  // 0.03 s
+  static constexpr double dt = 0x1.47ae147ae147bp-5;  // 0.04 s
 
   // weights: 1/2 w |residual|^2; the running ones are still to be multiplied by dt
   static constexpr double run_position = 0x1.4p+3;  // 10
@@ -50,7 +50,7 @@ struct PandaReach {
   static constexpr double run_torque = 0x1.0624dd2f1a9fcp-9;  // 0.002
   static constexpr double run_collision = 0x1.388p+14;  // 20000
   static constexpr double run_joint_limit = 0x1.388p+13;  // 10000
-  static constexpr double run_velocity_limit = 0x1.9p+7;  // 200
+  static constexpr double run_velocity_limit = 0x1.9p+8;  // 400
   static constexpr double run_torque_limit = 0x1p+0;  // 1
   static constexpr double end_position = 0x1.388p+13;  // 10000
   static constexpr double end_rotation = 0x1.f4p+9;  // 1000
@@ -60,9 +60,9 @@ struct PandaReach {
   static constexpr double end_joint_limit = 0x1.f4p+9;  // 1000
 
   // margins of the barriers
-  static constexpr double margin_collision = 0x1.47ae147ae147bp-5;  // 0.04 m
+  static constexpr double margin_collision = 0x1.eb851eb851eb8p-6;  // 0.03 m
   static constexpr double margin_joint = 0x1.999999999999ap-5;  // 0.05 rad
-  static constexpr double margin_velocity = 0x1.999999999999ap-4;  // 0.1 of the limit
+  static constexpr double margin_velocity = 0x1.3333333333333p-3;  // 0.15 of the limit
 
   // later than arrival_time after a jump, the running pose weights grow by arrival_factor
   static constexpr double arrival_time = 0x1.8p+0;  // 1.5 s
