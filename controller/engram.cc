@@ -73,7 +73,7 @@ const char* engram_candidate_text(engram_candidate c) { return text_of(kCandidat
 void engram_default_options(const engram_model* model, engram_options* options) {
   *options = engram_options{};
   options->memory = ENGRAM_MODE_MEMORY;
-  options->iterations = 2;
+  options->iterations = 4;
   options->iterations_jump = 10;
   options->starts = 3;
   options->line_search = 8;

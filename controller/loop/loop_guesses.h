@@ -56,15 +56,22 @@ template <class M> class Guesses {
     }
     return use(best);
   }
-  // Lowest merit among those that end elsewhere than all used before. Null if there is none.
-  const Candidate<P>* another() {
-    const Candidate<P>* best = nullptr;
-    for (int i = 0; i < n; ++i) {
-      bool other = true;
-      for (int j = 0; j < nused_; ++j) other = other && ends_elsewhere(candidate[i], *used_[j]);
-      if (other && (best == nullptr || candidate[i].merit < best->merit)) best = &candidate[i];
+  // Among those that end elsewhere than all used before: the one of the rank-th lowest merit, 0 the lowest. Null if there is none.
+  const Candidate<P>* another(int rank) {
+    const Candidate<P>* last = nullptr;
+    for (; rank >= 0; --rank) {
+      const Candidate<P>* best = nullptr;
+      for (int i = 0; i < n; ++i) {
+        const Candidate<P>& c = candidate[i];
+        if (last != nullptr && !(c.merit > last->merit)) continue;  // has an earlier rank
+        bool elsewhere = true;
+        for (int j = 0; j < nused_; ++j) elsewhere = elsewhere && ends_elsewhere(c, *used_[j]);
+        if (elsewhere && (best == nullptr || c.merit < best->merit)) best = &c;
+      }
+      if (best == nullptr) break;
+      last = best;
     }
-    return use(best);
+    return rank < 0 ? use(last) : nullptr;
   }
 
  private:

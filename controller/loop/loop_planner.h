@@ -23,6 +23,9 @@ namespace engram {
 inline constexpr int kNearKnots = 10;
 inline constexpr double kLargestNearGap = 0.1;
 inline constexpr double kLargestGap = 0.5;
+// Shares of what counts as success: within which a chosen plan ends at the target, and beyond which the plan under way does not.
+inline constexpr double kWellWithin = 0.5, kBarelyWithin = 0.9;
+inline constexpr int kRivals = 5;  // guesses that are tried in turn while the plan does not end at the target
 
 template <class M> class Planner {
  public:
@@ -185,25 +188,27 @@ template <class M> double Planner<M>::nearest_allowed() const {
 // Merit of the trajectory as it stands; none makes up for a collision, or for an end that is not the target's: that is a local
 // minimum, which the receding horizon would not leave again.
 template <class M> double Planner<M>::score(double nearest) const {
-  constexpr double kCollision = 1e6, kElsewhere = 1e3;
-  const bool collides = solve_.look_along(nullptr) < nearest, arrives = M::arrived(task_.target, solve_.plan.s.x[N]);
+  constexpr double kCollision = 1e6, kElsewhere = 200.0;
+  const bool collides = solve_.look_along(nullptr) < nearest, arrives = M::arrived(task_.target, solve_.plan.s.x[N], kWellWithin);
   return solve_.merit() + (collides ? kCollision : 0.0) + (arrives ? 0.0 : kElsewhere);
 }
 
-// Iterates from the best guess and, while the robot waits for a plan, from others that end elsewhere; readies the best result.
-// False if all solves failed.
+// Iterates from the best guess; while the robot waits for a plan, from others too that end elsewhere; and while the plan does not end
+// at the target, from one such other in turn. Readies the best result. False if all solves failed.
 template <class M> bool Planner<M>::search(bool waiting, Deadline& deadline) {
-  const int iterations = (waiting ? options_.iterations_jump : options_.iterations) - 1, starts = waiting ? options_.starts : 1;
+  const bool astray = !waiting && !M::arrived(task_.target, plan_.s.x[N], kBarelyWithin);
+  const int starts = waiting ? options_.starts : astray ? 2 : 1;
   const double resumed_reg = solve_.reg(), nearest = nearest_allowed();
   best_.score = HUGE_VAL;
   for (int s = 0; s < starts && (s == 0 || !deadline.late()); ++s) {
-    const Candidate<P>* const guess = s == 0 ? guesses_.best(jumped_ ? 0.0 : options_.switch_gain) : guesses_.another();
+    const int rank = astray ? static_cast<int>(seq_ % kRivals) : 0;
+    const Candidate<P>* const guess = s == 0 ? guesses_.best(jumped_ ? 0.0 : options_.switch_gain) : guesses_.another(rank);
     if (guess == nullptr) break;
     if (s == 0) cycle_.winner = guess->kind;
     const bool recorded = jumped_ && s == 0;
     if (recorded) record_start(*guess);
     solve_.start(guess->x, guess->u, guess->kind == ENGRAM_CANDIDATE_SHIFTED && !jumped_ ? resumed_reg : 0.0);
-    const bool sound = solve_.improve(iterations, deadline, [&] {
+    const bool sound = solve_.improve((waiting || s > 0 ? options_.iterations_jump : options_.iterations) - 1, deadline, [&] {
       if (recorded) record_merit(solve_.stats.iterations);
     });
     if (!sound) {

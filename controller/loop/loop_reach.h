@@ -29,15 +29,15 @@ template <class Task_, class Memory_> struct ReachModel {
     return true;
   }
   static void knot(const Target& t, double dt, double since_jump, Knot& k) { reach_knot<Task>(t, dt, since_jump, k); }
-  // True if the state x ends the task well: within half of what counts as success.
-  static bool arrived(const Target& t, const double* x) {
+  // True if the state x is within `share` of what counts as success.
+  static bool arrived(const Target& t, const double* x, double share) {
     Mat3<double> R_WH;
     Vec3<double> p;
     reach_hand<Task, double>(x, R_WH, p);
     double off2 = 0.0, trace = 0.0;  // |p - p*|^2 and tr(R*' R) = 1 + 2 cos(angle)
     for (int i = 0; i < 3; ++i) off2 += (p[i] - t.p[i]) * (p[i] - t.p[i]);
     for (int i = 0; i < 9; ++i) trace += t.R[i] * R_WH(i / 3, i % 3);
-    const double off = 0.5 * Task::success_position, angle = 0.5 * Task::success_rotation;
+    const double off = share * Task::success_position, angle = share * Task::success_rotation;
     return off2 <= off * off && trace >= 1.0 + 2.0 * std::cos(angle);
   }
   template <class S> static S clearance(const S* q) { return reach_clearance<Task, S>(q); }
