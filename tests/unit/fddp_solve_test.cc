@@ -171,7 +171,7 @@ struct ReachCase {
 // With the box, no control leaves it, and at the end those strictly inside have a zero gradient.
 TEST(FddpSolve, BoxKeepsControlsWithinTheirLimits) {
   auto c = std::make_unique<ReachCase>();
-  for (int k = 0; k < NR; ++k) c->h.knot[k].limit_w_u = 0.0;  // the box alone shall hold them
+  for (int k = 0; k < NR; ++k) c->h.knot[k].limit_w_u = c->h.knot[k].limit_w_v = 0.0;  // the box alone shall hold them
   for (int k = 0; k < NR; ++k) c->h.knot[k].pose_w_p *= 100;  // in a hurry: torques saturate
   auto free = std::make_unique<ReachCase>(*c);
   c->opts.box = true;
