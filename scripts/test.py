@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import time
@@ -109,7 +110,7 @@ def read_floor() -> dict[str, int]:
 def write_floor(counts: dict[str, Count]) -> None:
     """Keeps the present number of tests as the new floor."""
     rows = "".join(f"{rung} {count.ran}\n" for rung, count in counts.items())
-    FLOOR.write_text("# Smallest number of tests on each rung; `scripts/test.py --raise-floor` writes it.\n" + rows)
+    FLOOR.write_text("# Smallest number of tests on each rung; `scripts/test.sh --raise-floor` writes it.\n" + rows)
 
 
 def main() -> int:
@@ -121,6 +122,7 @@ def main() -> int:
     if unknown := [rung for rung in rungs if rung not in RUNGS]:
         parser.error(f"no rung {unknown[0]}; rungs: {' '.join(RUNGS)}")
 
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; tests send it
     counts: dict[str, Count] = {}
     for rung in rungs:
         print(f"---- {rung} ----", flush=True)

@@ -60,8 +60,11 @@ def test_it_builds_without_cmake(exported: Path, tmp_path: Path) -> None:
     sources = [*exported.glob("controller/*.cc"), *exported.glob("controller/tab/*.cc")]
     run("c++", "-std=c++17", "-fno-exceptions", "-fno-rtti", "-isystem", "/usr/include/eigen3", *flags, *sources, cwd=tmp_path)
     (tmp_path / "user.c").write_text(USER, encoding="utf-8")
-    run("cc", "-std=c11", *flags, *tables.glob("*.c"), *tables.glob("*.S"), "user.c", cwd=tmp_path)
-    run("cc", *tmp_path.glob("*.o"), "-lm", "-o", "user", cwd=tmp_path)
+    run("cc", "-std=c11", *flags, *tables.glob("*.c"), "user.c", cwd=tmp_path)
+    blobs = tmp_path / "blobs"  # a table's .c and .S give objects of the same name
+    blobs.mkdir()
+    run("cc", *flags, *tables.glob("*.S"), cwd=blobs)
+    run("cc", *tmp_path.glob("**/*.o"), "-lm", "-o", "user", cwd=tmp_path)
     assert run("./user", cwd=tmp_path) == "panda no error\n"
 
 
