@@ -51,7 +51,8 @@ constexpr const char* kErrors[] = {
 };
 constexpr const char* kStatuses[] = {
     "converged",       "iterating",       "deadline",  "no descent", "not positive definite", "not finite", "collision",
-    "open gaps",       "no task",         "bad task",  "task far",   "bad state",             "stale state", "stale plan",
+    "open gaps",       "too fast",        "no task",   "bad task",   "task far",              "bad state",   "stale state",
+    "stale plan",
 };
 constexpr const char* kRungs[] = {"plan", "shifted", "hold", "damping", "off"};
 constexpr const char* kCandidates[] = {"shifted", "knn", "gpr", "line", "cold"};

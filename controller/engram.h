@@ -83,6 +83,7 @@ typedef enum engram_status {
   ENGRAM_NOT_FINITE,        // the solver met a value that is not finite
   ENGRAM_COLLISION,         // the plan comes nearer to an obstacle than clearance_min: not executed
   ENGRAM_OPEN_GAPS,         // the plan is not yet a motion (gaps too large): not executed
+  ENGRAM_TOO_FAST,          // the plan breaks a velocity limit in the near future: not executed
   ENGRAM_NO_TASK,           // no task yet: holds
   ENGRAM_BAD_TASK,          // task refused: wrong length, not finite; the last one stays
   ENGRAM_TASK_FAR,          // task taken, but outside the range the memory was built for: memory is not asked

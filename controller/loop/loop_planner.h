@@ -23,6 +23,7 @@ namespace engram {
 inline constexpr int kNearKnots = 10;
 inline constexpr double kLargestNearGap = 0.1;
 inline constexpr double kLargestGap = 0.5;
+inline constexpr double kLargestSpeed = 1.0;  // of the velocity limit, in the near future; a robot that is faster already may brake
 // Shares of what counts as success: within which a chosen plan ends at the target, and beyond which the plan under way does not.
 inline constexpr double kWellWithin = 0.5, kBarelyWithin = 0.9;
 inline constexpr int kRivals = 5;  // guesses that are tried in turn while the plan does not end at the target
@@ -261,6 +262,7 @@ template <class M> engram_status Planner<M>::judge(bool accepted) {
   if (!(cycle_.clearance >= nearest_allowed())) return ENGRAM_COLLISION;
   // gap 0 lies between the measured state and the first knot: the gains answer for it
   if (!(solve_.open_gap(1, kNearKnots) <= kLargestNearGap && solve_.open_gap(1, N) <= kLargestGap)) return ENGRAM_OPEN_GAPS;
+  if (!(solve_.speed(1, kNearKnots) <= std::max(kLargestSpeed, solve_.speed(0, 0)))) return ENGRAM_TOO_FAST;
   if (ending_ == ENGRAM_DEADLINE) return ENGRAM_DEADLINE;
   if (!accepted) return ENGRAM_NO_DESCENT;
   return solve_.stop() < kStop ? ENGRAM_CONVERGED : ENGRAM_ITERATING;
@@ -313,7 +315,7 @@ template <class M> engram_status Planner<M>::feedback(int64_t utime, const doubl
 
   if (good) std::memcpy(solve_.horizon.x0, watch_.x, sizeof(solve_.horizon.x0));
   const engram_status status = judge(solve_.feedback(task_.target, jump_utime_, utime));
-  if (status == ENGRAM_COLLISION || status == ENGRAM_OPEN_GAPS) trial_ = Trial::kPostponed;
+  if (status == ENGRAM_COLLISION || status == ENGRAM_OPEN_GAPS || status == ENGRAM_TOO_FAST) trial_ = Trial::kPostponed;
   if (status == ENGRAM_NOT_FINITE || trial_ == Trial::kPostponed) return finish(status, fallback, deadline);
   plan_ = solve_.plan;
   plan_jump_ = task_.jump;

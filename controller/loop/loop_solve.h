@@ -118,6 +118,14 @@ template <class M> class Solve {
            all_finite(plan.s.K[0][0], N * nu * P::Layout::nxp);
   }
 
+  // Largest |v| of knots first to last, relative to its limit.
+  double speed(int first, int last) const {
+    double most = 0.0;
+    for (int k = first; k <= last; ++k)
+      for (int i = P::nv - P::nu; i < P::nv; ++i) most = std::max(most, std::fabs(plan.s.x[k][P::nq + i]) / P::R::v_max[i]);
+    return most;
+  }
+
   // Smallest clearance [m] along the trajectory, at the knots and half-way between them. `path`, if not null: the hand at the knots [m].
   double look_along(double (*path)[3]) const {
     constexpr int nq = P::nq;

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "tables/panda_reach/task.h"
 #include "tests/support/panda_plant.h"
 
 namespace engram::test {
@@ -24,9 +25,10 @@ TEST(Door, DescribesItsModel) {
   EXPECT_EQ(about.nq, 7);
   EXPECT_EQ(about.nv, 7);
   EXPECT_EQ(about.nu, 7);
-  EXPECT_EQ(about.ntask, 7);
-  EXPECT_EQ(about.knots, 50);
-  EXPECT_DOUBLE_EQ(about.knot_dt, 0.03);
+  EXPECT_EQ(about.task_digest, tasks::PandaReach::digest);
+  EXPECT_EQ(about.ntask, tasks::PandaReach::ntask);
+  EXPECT_EQ(about.knots, tasks::PandaReach::nknots);
+  EXPECT_NEAR(about.knot_dt, tasks::PandaReach::dt, 1e-6);  // knots are whole microseconds
   EXPECT_EQ(about.tick_us, 10000);
   EXPECT_STREQ(engram_version(), ENGRAM_VERSION);
 }
