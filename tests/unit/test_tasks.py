@@ -121,7 +121,7 @@ def test_flip_turns_about_the_approach_and_mirror_keeps_it_right_handed(spec):
 
 def test_digest_follows_world_weights_and_robot(models):
     seen = {load_task("panda", "reach", models).digest}
-    spoil(models, "collision = 0.04", "collision = 0.041")
+    spoil(models, "collision = 0.03", "collision = 0.031")
     seen.add(load_task("panda", "reach", models).digest)
     spoil(models, 'pos="0.32 0 -0.03"', 'pos="0.32 0 -0.031"', "world.xml")
     seen.add(load_task("panda", "reach", models).digest)
@@ -137,7 +137,7 @@ WRONG = {
     "missing weight": ("torque = 2e-3", "", r"key 'torque' is missing"),
     "negative weight": ("velocity = 0.05", "velocity = -0.05", r"velocity: must not be negative"),
     "half a knot": ("knots = 50", "knots = 49.5", r"knots: expected a positive whole number"),
-    "no time": ("dt = 0.03", "dt = 0.0", r"dt: expected a positive time"),
+    "no time": ("dt = 0.04", "dt = 0.0", r"dt: expected a positive time"),
     "crossed range": ('"m", 0.15, 0.80', '"m", 0.85, 0.80', r"lowest < highest"),
     "unknown frame": ('frame = "hand_tcp"', 'frame = "hand_tpc"', r"has no frame 'hand_tpc'; did you mean 'hand_tcp'"),
     "shares": ("share = 0.25", "share = 0.35", r"must sum to 1, they sum to 1\.1"),
