@@ -24,8 +24,7 @@ inline constexpr int kNearKnots = 10;
 inline constexpr double kLargestNearGap = 0.1;
 inline constexpr double kLargestGap = 0.5;
 inline constexpr double kLargestSpeed = 1.0;  // of the velocity limit, in the near future; a robot that is faster already may brake
-// Shares of what counts as success: within which a chosen plan ends at the target, and beyond which the plan under way does not.
-inline constexpr double kWellWithin = 0.5, kBarelyWithin = 0.9;
+inline constexpr double kAstray = 0.9;  // share of what counts as success, beyond which the plan under way misses its target
 inline constexpr int kRivals = 5;  // guesses that are tried in turn while the plan does not end at the target
 
 template <class M> class Planner {
@@ -186,18 +185,18 @@ template <class M> double Planner<M>::nearest_allowed() const {
   return std::min(options_.clearance_min, M::template clearance<double>(solve_.horizon.x0) - 1e-3);
 }
 
-// Merit of the trajectory as it stands; none makes up for a collision, or for an end that is not the target's: that is a local
-// minimum, which the receding horizon would not leave again.
+// Merit of the trajectory as it stands; none makes up for a collision, or for a bad end: that is a local minimum, which the receding
+// horizon would not leave again.
 template <class M> double Planner<M>::score(double nearest) const {
   constexpr double kCollision = 1e6, kElsewhere = 200.0;
-  const bool collides = solve_.look_along(nullptr) < nearest, arrives = M::arrived(task_.target, solve_.plan.s.x[N], kWellWithin);
-  return solve_.merit() + (collides ? kCollision : 0.0) + (arrives ? 0.0 : kElsewhere);
+  const bool collides = solve_.look_along(nullptr) < nearest, ends_well = M::ends_well(task_.target, solve_.plan.s.x[N]);
+  return solve_.merit() + (collides ? kCollision : 0.0) + (ends_well ? 0.0 : kElsewhere);
 }
 
 // Iterates from the best guess; while the robot waits for a plan, from others too that end elsewhere; and while the plan does not end
 // at the target, from one such other in turn. Readies the best result. False if all solves failed.
 template <class M> bool Planner<M>::search(bool waiting, Deadline& deadline) {
-  const bool astray = !waiting && !M::arrived(task_.target, plan_.s.x[N], kBarelyWithin);
+  const bool astray = !waiting && !M::arrived(task_.target, plan_.s.x[N], kAstray);
   const int starts = waiting ? options_.starts : astray ? 2 : 1;
   const double resumed_reg = solve_.reg(), nearest = nearest_allowed();
   best_.score = HUGE_VAL;

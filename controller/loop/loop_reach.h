@@ -40,6 +40,11 @@ template <class Task_, class Memory_> struct ReachModel {
     const double off = share * Task::success_position, angle = share * Task::success_rotation;
     return off2 <= off * off && trace >= 1.0 + 2.0 * std::cos(angle);
   }
+  // True if a motion may well end in the state x: well within what counts as success, and with the margin to the obstacles that the
+  // problem asks for. Where the margin must yield to the target, the target will have to yield to the margin later on.
+  static bool ends_well(const Target& t, const double* x) {
+    return arrived(t, x, 0.5) && clearance<double>(x) >= 0.8 * Task::margin_collision;
+  }
   template <class S> static S clearance(const S* q) { return reach_clearance<Task, S>(q); }
   template <class S> static void hand(const S* q, S* p_WH) {
     Mat3<S> R_WH;
