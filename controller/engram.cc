@@ -50,9 +50,9 @@ constexpr const char* kErrors[] = {
     "the memory's tables do not belong to this robot and task: run 'make tables' and build again",
 };
 constexpr const char* kStatuses[] = {
-    "converged",       "iterating",       "deadline",  "no descent", "not positive definite", "not finite", "collision",
-    "open gaps",       "too fast",        "no task",   "bad task",   "task far",              "bad state",   "stale state",
-    "stale plan",
+    "converged",  "iterating", "deadline",  "no descent",  "not positive definite",
+    "not finite", "collision", "open gaps", "too fast",    "no task",
+    "bad task",   "task far",  "bad state", "stale state", "stale plan",
 };
 constexpr const char* kRungs[] = {"plan", "shifted", "hold", "damping", "off"};
 constexpr const char* kCandidates[] = {"shifted", "knn", "gpr", "line", "cold"};
@@ -69,7 +69,9 @@ uint64_t engram_table_digest(const engram_model* model) { return model->table_di
 const char* engram_error_text(engram_error error) { return text_of(kErrors, size_of(kErrors), error, "unknown error"); }
 const char* engram_status_text(engram_status status) { return text_of(kStatuses, size_of(kStatuses), status, "unknown status"); }
 const char* engram_rung_text(engram_rung rung) { return text_of(kRungs, size_of(kRungs), rung, "unknown rung"); }
-const char* engram_candidate_text(engram_candidate c) { return text_of(kCandidates, size_of(kCandidates), c, "unknown candidate"); }
+const char* engram_candidate_text(engram_candidate c) {
+  return text_of(kCandidates, size_of(kCandidates), c, "unknown candidate");
+}
 
 void engram_default_options(const engram_model* model, engram_options* options) {
   *options = engram_options{};

@@ -11,11 +11,20 @@ void Tally::take(const engram_cycle& cycle) {
 
 void report_status(Report* report, engram_status status, int64_t utime, int64_t seq) {
   switch (status) {
-    case ENGRAM_BAD_STATE: report->note(Trouble::kBadState, utime, seq); break;
-    case ENGRAM_STALE_STATE: report->note(Trouble::kStaleState, utime, seq); break;
-    case ENGRAM_BAD_TASK: report->note(Trouble::kBadTask, utime, seq); break;
-    case ENGRAM_TASK_FAR: report->note(Trouble::kTaskFar, utime, seq); break;
-    default: break;
+    case ENGRAM_BAD_STATE:
+      report->note(Trouble::kBadState, utime, seq);
+      break;
+    case ENGRAM_STALE_STATE:
+      report->note(Trouble::kStaleState, utime, seq);
+      break;
+    case ENGRAM_BAD_TASK:
+      report->note(Trouble::kBadTask, utime, seq);
+      break;
+    case ENGRAM_TASK_FAR:
+      report->note(Trouble::kTaskFar, utime, seq);
+      break;
+    default:
+      break;
   }
 }
 
@@ -34,14 +43,17 @@ Lockstep::Lockstep(engram_controller* controller, Sender sender, Notes* notes, R
 void Lockstep::on_state(const void* bytes, uint32_t size) {
   const int64_t last = state_.utime;
   switch (inbox_.state(bytes, size, &state_)) {
-    case Verdict::kIgnored: return;
-    case Verdict::kDuplicate: return sent(outbox_.command_again());
+    case Verdict::kIgnored:
+      return;
+    case Verdict::kDuplicate:
+      return sent(outbox_.command_again());
     case Verdict::kRestart:
       engram_reset(controller_);
       tick_ = 0;
       if (belongs_to_restart(task_, last, state_.utime)) give_task();
       break;
-    case Verdict::kNew: break;
+    case Verdict::kNew:
+      break;
   }
   ++tally_.states;
   const bool tick = state_.utime >= tick_;

@@ -17,9 +17,9 @@
 namespace engram::io {
 namespace {
 
-constexpr int kListenMs = 300;     // how long a newcomer listens for others
+constexpr int kListenMs = 300;  // how long a newcomer listens for others
 constexpr int kPollMs = 100;
-constexpr double kSilence = 1.0;   // s without a state that deserve a word
+constexpr double kSilence = 1.0;  // s without a state that deserve a word
 constexpr int kPriority = 60;
 
 volatile std::sig_atomic_t interrupted = 0;
@@ -85,9 +85,10 @@ void Program::on_task(const void* bytes, uint32_t size) {
 
 bool Program::ask_to_serve() {
   presence_.emplace(unique_id(), transport_.sender());
-  transport_.listen(kPresenceChannel, [](void* p, const void* b, uint32_t n) { static_cast<Presence*>(p)->on_presence(b, n); },
-                    &*presence_);
-  transport_.listen(kCommandChannel, [](void* p, const void*, uint32_t) { static_cast<Presence*>(p)->on_command(); }, &*presence_);
+  transport_.listen(
+      kPresenceChannel, [](void* p, const void* b, uint32_t n) { static_cast<Presence*>(p)->on_presence(b, n); }, &*presence_);
+  transport_.listen(
+      kCommandChannel, [](void* p, const void*, uint32_t) { static_cast<Presence*>(p)->on_command(); }, &*presence_);
   presence_->ask();
   const double end = wall_seconds() + 1e-3 * kListenMs;
   for (double left; !interrupted && !presence_->taken() && (left = end - wall_seconds()) > 0;) {
@@ -95,9 +96,10 @@ bool Program::ask_to_serve() {
   }
   transport_.stop_listening(kCommandChannel);
   if (!presence_->taken()) return presence_->serve(), true;
-  std::fprintf(stderr,
-               "engram-controller: another controller serves on this network already: leaving it the robot; stop it first, or choose "
-               "another --lcm-url\n");
+  std::fprintf(
+      stderr,
+      "engram-controller: another controller serves on this network already: leaving it the robot; stop it first, or choose "
+      "another --lcm-url\n");
   return false;
 }
 
@@ -124,9 +126,9 @@ void Program::serve() {
 
 void Program::summarize() {
   const Tally& t = lockstep_ ? lockstep_->tally() : wall_->tally();
-  std::printf("engram-controller: %lld states, %lld cycles, CPU per cycle mean %.2f ms, max %.2f ms; rungs:", static_cast<long long>(t.states),
-              static_cast<long long>(t.cycles), t.cycles ? 1e-3 * t.cycle_us_sum / static_cast<double>(t.cycles) : 0.0,
-              1e-3 * t.cycle_us_max);
+  std::printf("engram-controller: %lld states, %lld cycles, CPU per cycle mean %.2f ms, max %.2f ms; rungs:",
+              static_cast<long long>(t.states), static_cast<long long>(t.cycles),
+              t.cycles ? 1e-3 * t.cycle_us_sum / static_cast<double>(t.cycles) : 0.0, 1e-3 * t.cycle_us_max);
   for (int r = 0; r < ENGRAM_RUNG_COUNT; ++r) {
     std::printf(" %s %lld", engram_rung_text(static_cast<engram_rung>(r)), static_cast<long long>(t.rung[r]));
   }
@@ -145,10 +147,13 @@ int Program::run() {
     std::fprintf(stderr, "engram-controller: %s\n", engram_error_text(error));
     return kExitUsage;
   }
-  if (!notes_.open_timing(settings_.timing) || !notes_.open_jumps(settings_.jumps, *engram_describe(settings_.model))) return kExitUsage;
+  if (!notes_.open_timing(settings_.timing) || !notes_.open_jumps(settings_.jumps, *engram_describe(settings_.model)))
+    return kExitUsage;
   if (!transport_.open(settings_.lcm_url)) return kExitNetwork;
-  transport_.listen(kStateChannel, [](void* p, const void* b, uint32_t n) { static_cast<Program*>(p)->on_state(b, n); }, this);
-  transport_.listen(kTaskChannel, [](void* p, const void* b, uint32_t n) { static_cast<Program*>(p)->on_task(b, n); }, this);
+  transport_.listen(
+      kStateChannel, [](void* p, const void* b, uint32_t n) { static_cast<Program*>(p)->on_state(b, n); }, this);
+  transport_.listen(
+      kTaskChannel, [](void* p, const void* b, uint32_t n) { static_cast<Program*>(p)->on_task(b, n); }, this);
 
   struct sigaction action = {};
   action.sa_handler = interrupt;

@@ -22,10 +22,10 @@ inline constexpr char kTimingChannel[] = "ENGRAM_TIMING";
 inline constexpr char kPresenceChannel[] = "ENGRAM_PRESENCE";
 
 // One overload set over the functions that lcm-gen writes per type.
-#define ENGRAM_IO_MESSAGE(M)                                                                                   \
-  inline int encoded_size(const M& m) { return M##_encoded_size(&m); }                                         \
-  inline int encode(void* bytes, int size, const M& m) { return M##_encode(bytes, 0, size, &m); }              \
-  inline int decode(const void* bytes, int size, M* m) { return M##_decode(bytes, 0, size, m); }               \
+#define ENGRAM_IO_MESSAGE(M)                                                                      \
+  inline int encoded_size(const M& m) { return M##_encoded_size(&m); }                            \
+  inline int encode(void* bytes, int size, const M& m) { return M##_encode(bytes, 0, size, &m); } \
+  inline int decode(const void* bytes, int size, M* m) { return M##_decode(bytes, 0, size, m); }  \
   inline uint64_t fingerprint(const M&) { return static_cast<uint64_t>(__##M##_get_hash()); }
 ENGRAM_IO_MESSAGE(engram_msg_state_t)
 ENGRAM_IO_MESSAGE(engram_msg_task_t)

@@ -20,7 +20,8 @@ bool Notes::open(File* file, const char* path) {
 bool Notes::open_timing(const char* path) {
   if (!open(&timing_, path)) return false;
   if (timing_.file) {
-    std::fputs("utime,seq,jump,rung,iterations,query_us,candidates_us,linearize_us,backward_us,rollout_us,total_us\n", timing_.file);
+    std::fputs("utime,seq,jump,rung,iterations,query_us,candidates_us,linearize_us,backward_us,rollout_us,total_us\n",
+               timing_.file);
   }
   return true;
 }

@@ -20,7 +20,7 @@ class Outbox {
   // The command for a state. Kept, so that the same state heard again gets the same bytes.
   bool command(const engram_msg_state_t& state, engram_status status, const double* tau);
   bool command_again() { return command_size_ == 0 || send(kCommandChannel, command_bytes_, command_size_); }
-  bool cycle(const engram_cycle& cycle);  // cycle_t
+  bool cycle(const engram_cycle& cycle);   // cycle_t
   bool timing(const engram_cycle& cycle);  // timing_t
   void forget() { command_size_ = 0; }
 

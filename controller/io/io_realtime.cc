@@ -19,13 +19,15 @@ double thread_cpu_us() {
 
 void go_realtime(int priority) {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
-    std::fprintf(stderr, "engram-controller: --realtime: memory not locked (%s): raise 'ulimit -l' or run as root\n", std::strerror(errno));
+    std::fprintf(stderr, "engram-controller: --realtime: memory not locked (%s): raise 'ulimit -l' or run as root\n",
+                 std::strerror(errno));
   }
   sched_param param = {};
   param.sched_priority = priority;
   const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &param);
   if (error != 0) {
-    std::fprintf(stderr, "engram-controller: --realtime: no real-time priority (%s): raise 'ulimit -r' or run as root\n", std::strerror(error));
+    std::fprintf(stderr, "engram-controller: --realtime: no real-time priority (%s): raise 'ulimit -r' or run as root\n",
+                 std::strerror(error));
   }
 }
 

@@ -43,8 +43,8 @@ void print_help(const Settings& s) {
       "\n"
       "Ends on SIGINT or SIGTERM with a summary. Exit codes: 0 ended as asked, %d wrong usage, %d no network,\n"
       "%d another controller serves the robot already.\n",
-      engram_describe(s.model)->robot, engram_describe(s.model)->task, s.lcm_url, s.options.iterations, s.options.iterations_jump, s.options.starts,
-      kWallBudgetUs, kExitUsage, kExitNetwork, kExitTaken);
+      engram_describe(s.model)->robot, engram_describe(s.model)->task, s.lcm_url, s.options.iterations, s.options.iterations_jump,
+      s.options.starts, kWallBudgetUs, kExitUsage, kExitNetwork, kExitTaken);
 }
 
 int wrong(const char* format, const char* what) {
@@ -78,16 +78,37 @@ bool read_count(const char* text, int32_t* value) {
 }  // namespace
 
 bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
-  enum { kRobot = 1, kTask, kUrl, kClock, kMemory, kIterations, kIterationsJump, kStarts, kBudget, kTiming, kJumps, kRealtime, kVersion, kHelp };
-  static const option kOptions[] = {
-      {"robot", required_argument, nullptr, kRobot},           {"task", required_argument, nullptr, kTask},
-      {"lcm-url", required_argument, nullptr, kUrl},           {"clock", required_argument, nullptr, kClock},
-      {"memory", required_argument, nullptr, kMemory},         {"iterations", required_argument, nullptr, kIterations},
-      {"iterations-jump", required_argument, nullptr, kIterationsJump}, {"starts", required_argument, nullptr, kStarts},
-      {"budget", required_argument, nullptr, kBudget},         {"timing", required_argument, nullptr, kTiming},
-      {"jumps", required_argument, nullptr, kJumps},           {"realtime", no_argument, nullptr, kRealtime},
-      {"version", no_argument, nullptr, kVersion},             {"help", no_argument, nullptr, kHelp},
-      {nullptr, 0, nullptr, 0}};
+  enum {
+    kRobot = 1,
+    kTask,
+    kUrl,
+    kClock,
+    kMemory,
+    kIterations,
+    kIterationsJump,
+    kStarts,
+    kBudget,
+    kTiming,
+    kJumps,
+    kRealtime,
+    kVersion,
+    kHelp
+  };
+  static const option kOptions[] = {{"robot", required_argument, nullptr, kRobot},
+                                    {"task", required_argument, nullptr, kTask},
+                                    {"lcm-url", required_argument, nullptr, kUrl},
+                                    {"clock", required_argument, nullptr, kClock},
+                                    {"memory", required_argument, nullptr, kMemory},
+                                    {"iterations", required_argument, nullptr, kIterations},
+                                    {"iterations-jump", required_argument, nullptr, kIterationsJump},
+                                    {"starts", required_argument, nullptr, kStarts},
+                                    {"budget", required_argument, nullptr, kBudget},
+                                    {"timing", required_argument, nullptr, kTiming},
+                                    {"jumps", required_argument, nullptr, kJumps},
+                                    {"realtime", no_argument, nullptr, kRealtime},
+                                    {"version", no_argument, nullptr, kVersion},
+                                    {"help", no_argument, nullptr, kHelp},
+                                    {nullptr, 0, nullptr, 0}};
   s->model = kModels[0];
   engram_default_options(s->model, &s->options);
   s->options.clock = thread_cpu_us;
@@ -97,12 +118,24 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
   opterr = 0;
   for (int c; (c = getopt_long(argc, argv, "", kOptions, nullptr)) != -1;) {
     switch (c) {
-      case kRobot: robot = optarg; break;
-      case kTask: task = optarg; break;
-      case kUrl: s->lcm_url = optarg; break;
-      case kTiming: s->timing = optarg; break;
-      case kJumps: s->jumps = optarg; break;
-      case kRealtime: s->realtime = true; break;
+      case kRobot:
+        robot = optarg;
+        break;
+      case kTask:
+        task = optarg;
+        break;
+      case kUrl:
+        s->lcm_url = optarg;
+        break;
+      case kTiming:
+        s->timing = optarg;
+        break;
+      case kJumps:
+        s->jumps = optarg;
+        break;
+      case kRealtime:
+        s->realtime = true;
+        break;
       case kClock:
         if (std::strcmp(optarg, "lockstep") == 0) s->clock = Clock::kLockstep;
         else if (std::strcmp(optarg, "wall") == 0) s->clock = Clock::kWall;
@@ -111,7 +144,8 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
       case kMemory: {
         int mode = 0;
         while (mode < ENGRAM_MODE_COUNT && std::strcmp(optarg, kModes[mode]) != 0) ++mode;
-        if (mode == ENGRAM_MODE_COUNT) return *exit_code = wrong("--memory %s: must be memory, line, shift or cold", optarg), false;
+        if (mode == ENGRAM_MODE_COUNT)
+          return *exit_code = wrong("--memory %s: must be memory, line, shift or cold", optarg), false;
         s->options.memory = static_cast<engram_mode>(mode);
         break;
       }
@@ -119,7 +153,8 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
         if (!read_count(optarg, &s->options.iterations)) return *exit_code = wrong("--iterations %s: not a count", optarg), false;
         break;
       case kIterationsJump:
-        if (!read_count(optarg, &s->options.iterations_jump)) return *exit_code = wrong("--iterations-jump %s: not a count", optarg), false;
+        if (!read_count(optarg, &s->options.iterations_jump))
+          return *exit_code = wrong("--iterations-jump %s: not a count", optarg), false;
         break;
       case kStarts:
         if (!read_count(optarg, &s->options.starts)) return *exit_code = wrong("--starts %s: not a count", optarg), false;
@@ -128,9 +163,12 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
         if (!read_number(optarg, &s->options.budget_us)) return *exit_code = wrong("--budget %s: not a number", optarg), false;
         budget_given = true;
         break;
-      case kVersion: return std::printf("engram-controller %s\n", engram_version()), *exit_code = 0, false;
-      case kHelp: return print_help(*s), *exit_code = 0, false;
-      default: return *exit_code = wrong("unknown option or missing value: %s", argv[optind - 1]), false;
+      case kVersion:
+        return std::printf("engram-controller %s\n", engram_version()), *exit_code = 0, false;
+      case kHelp:
+        return print_help(*s), *exit_code = 0, false;
+      default:
+        return *exit_code = wrong("unknown option or missing value: %s", argv[optind - 1]), false;
     }
   }
   if (optind < argc) return *exit_code = wrong("unexpected argument: %s", argv[optind]), false;
@@ -138,7 +176,8 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
   s->model = find_model(robot, task);
   if (s->model == nullptr) {
     std::fprintf(stderr, "engram-controller: no model '%s %s' in this binary; it holds:", robot, task);
-    for (const engram_model* model : kModels) std::fprintf(stderr, " '%s %s'", engram_describe(model)->robot, engram_describe(model)->task);
+    for (const engram_model* model : kModels)
+      std::fprintf(stderr, " '%s %s'", engram_describe(model)->robot, engram_describe(model)->task);
     std::fputs("\n", stderr);
     return false;
   }

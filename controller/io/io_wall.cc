@@ -39,8 +39,11 @@ void Wall::stop() {
 void Wall::on_state(const void* bytes, uint32_t size) {
   const int64_t last = state_.utime;
   switch (inbox_.state(bytes, size, &state_)) {
-    case Verdict::kIgnored: return;
-    case Verdict::kDuplicate: commands_.command_again(); return;
+    case Verdict::kIgnored:
+      return;
+    case Verdict::kDuplicate:
+      commands_.command_again();
+      return;
     case Verdict::kRestart:
       resetting_ = true;
       wake();
@@ -49,7 +52,8 @@ void Wall::on_state(const void* bytes, uint32_t size) {
         tasks_.publish();
       }
       return;
-    case Verdict::kNew: break;
+    case Verdict::kNew:
+      break;
   }
   if (resetting_) return;
   ++tally_.states;
@@ -94,7 +98,8 @@ void Wall::plan() {
     notes_->cycle(controller_, cycle);
     if (tasks_.refresh()) {
       const engram_msg_task_t& task = tasks_.value();
-      report_status(&planner_report_, engram_set_task(controller_, task.utime, task.jump, task.value, task.n), task.utime, task.seq);
+      report_status(&planner_report_, engram_set_task(controller_, task.utime, task.jump, task.value, task.n), task.utime,
+                    task.seq);
     }
     tick_ = s.utime + about_.tick_us;
     engram_prepare(controller_, tick_);

@@ -50,8 +50,8 @@ class Wall {
   // between the threads
   Exchange<State> states_;
   Exchange<engram_msg_task_t> tasks_;
-  std::atomic<int64_t> tick_{0};         // us, time of the next feedback
-  std::atomic<bool> resetting_{false};   // no commands until the planner has reset the controller
+  std::atomic<int64_t> tick_{0};        // us, time of the next feedback
+  std::atomic<bool> resetting_{false};  // no commands until the planner has reset the controller
   std::atomic<bool> stopping_{false};
   sem_t wake_;
 

@@ -15,7 +15,8 @@ template <class M> struct LoopController : engram_controller {
   static constexpr int N = M::N;
   static_assert(P::nx <= ENGRAM_NX_MAX && M::ntask <= ENGRAM_NTASK_MAX && N < ENGRAM_KNOTS_MAX, "bounds of engram.h");
 
-  LoopController(const engram_model* m, const engram_options& o) : engram_controller{m, o}, fast(options), planner(options, fast) {}
+  LoopController(const engram_model* m, const engram_options& o)
+      : engram_controller{m, o}, fast(options), planner(options, fast) {}
 
   FastLoop<P, N> fast;
   Planner<M> planner;

@@ -19,9 +19,9 @@
 
 namespace engram {
 
-inline constexpr double kDamping = 0.1;      // s/rad, of the torque limit
-inline constexpr double kOverspeed = 1.5;    // of the velocity limit: damping takes over
-inline constexpr double kLargestEntry = 1e3; // a measured coordinate or velocity beyond it (rad, m, per s) is no measurement
+inline constexpr double kDamping = 0.1;       // s/rad, of the torque limit
+inline constexpr double kOverspeed = 1.5;     // of the velocity limit: damping takes over
+inline constexpr double kLargestEntry = 1e3;  // a measured coordinate or velocity beyond it (rad, m, per s) is no measurement
 
 // True if x could be a measurement.
 template <class P> bool plausible(const double* q, const double* v) {
@@ -84,9 +84,9 @@ template <class P, int N> class FastLoop {
 
   StateWatch<P> watch_;
   bool commanded_ = false, holding_ = false, overspeed_ = false;
-  int64_t utime_ = 0;      // us, of the last command
+  int64_t utime_ = 0;  // us, of the last command
   double q_hold_[nq] = {};
-  double tau_[nu] = {};    // last command
+  double tau_[nu] = {};  // last command
 };
 
 template <class P, int N> bool FastLoop<P, N>::plan_law(int64_t utime, bool good, double* tau) const {
@@ -131,8 +131,7 @@ template <class P, int N> void FastLoop<P, N>::limit(int64_t utime, double* tau)
   }
 }
 
-template <class P, int N>
-engram_status FastLoop<P, N>::command(int64_t utime, const double* q, const double* v, double* tau) {
+template <class P, int N> engram_status FastLoop<P, N>::command(int64_t utime, const double* q, const double* v, double* tau) {
   if (commanded_ && utime < utime_) {
     std::memcpy(tau, tau_, sizeof(tau_));
     return ENGRAM_STALE_STATE;

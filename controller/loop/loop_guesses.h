@@ -51,7 +51,8 @@ template <class M> class Guesses {
     for (int i = 0; i < n; ++i) {
       const Candidate<P>& c = candidate[i];
       if (best == nullptr) best = &c;
-      else if (best->kind != ENGRAM_CANDIDATE_SHIFTED || c.kind == ENGRAM_CANDIDATE_SHIFTED) best = c.merit < best->merit ? &c : best;
+      else if (best->kind != ENGRAM_CANDIDATE_SHIFTED || c.kind == ENGRAM_CANDIDATE_SHIFTED)
+        best = c.merit < best->merit ? &c : best;
       else if (c.merit < (1.0 - gain) * (gain > 0.0 ? best->cost : best->merit)) best = &c;
     }
     return use(best);

@@ -23,9 +23,10 @@ namespace engram {
 inline constexpr int kNearKnots = 10;
 inline constexpr double kLargestNearGap = 0.1;
 inline constexpr double kLargestGap = 0.5;
-inline constexpr double kLargestSpeed = 1.0;  // of the velocity limit, in the near future; a robot that is faster already may brake
+// Largest speed in the near future, of the velocity limit; a robot that is faster already may brake.
+inline constexpr double kLargestSpeed = 1.0;
 inline constexpr double kAstray = 0.9;  // share of what counts as success, beyond which the plan under way misses its target
-inline constexpr int kRivals = 5;  // guesses that are tried in turn while the plan does not end at the target
+inline constexpr int kRivals = 5;       // guesses that are tried in turn while the plan does not end at the target
 
 template <class M> class Planner {
  public:
@@ -80,19 +81,19 @@ template <class M> class Planner {
 
   bool has_task_ = false, task_pending_ = false;
   Task task_, pending_;
-  bool jumped_ = false;          // the next problem is the first of a jump
-  int32_t plan_jump_ = 0;        // jump that `plan_` serves
-  int64_t jump_utime_ = 0;       // us, first knot of the jump's first problem
+  bool jumped_ = false;     // the next problem is the first of a jump
+  int32_t plan_jump_ = 0;   // jump that `plan_` serves
+  int64_t jump_utime_ = 0;  // us, first knot of the jump's first problem
 
   StateWatch<P> watch_;
-  Plan<P, N> plan_;              // executed; n = 0: none
+  Plan<P, N> plan_;  // executed; n = 0: none
   Solve<M> solve_;
   Trial trial_ = Trial::kNone;
   engram_status ending_ = ENGRAM_ITERATING;  // of the iterations before the feedback
   Guesses<M> guesses_;
   Result best_;
 
-  bool prepared_ = false;        // cycle_ belongs to the period under way
+  bool prepared_ = false;  // cycle_ belongs to the period under way
   engram_cycle cycle_ = {}, finished_ = {};
   engram_jump jump_ = {};
   int64_t seq_ = 0;

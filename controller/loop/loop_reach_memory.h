@@ -22,7 +22,8 @@ template <class Task, const MemoryTables& tables> struct ReachMemory {
   }
   static uint64_t table_digest() {
     uint64_t digest = 0;
-    for (const TabHead* head : {&tables.knn->head, &tables.gpr->head, &tables.bow->head, &tables.time->head, &tables.trust->head}) {
+    for (const TabHead* head :
+         {&tables.knn->head, &tables.gpr->head, &tables.bow->head, &tables.time->head, &tables.trust->head}) {
       digest = (digest ^ head->digest) * 0x100000001b3;  // as FNV-1a
     }
     return digest;
@@ -30,8 +31,8 @@ template <class Task, const MemoryTables& tables> struct ReachMemory {
 
   // Appends the guesses (the straight lines alone, unless `remember`) for the state x0 on N + 1 knot times t [s] to the n candidates;
   // returns their new number.
-  template <class P>
-  int guesses(const ReachTarget& target, bool remember, const double* x0, int N, const double* t, Candidate<P>* candidates, int n) {
+  template <class P> int guesses(const ReachTarget& target, bool remember, const double* x0, int N, const double* t,
+                                 Candidate<P>* candidates, int n) {
     MemoryOpts opts;
     if (!remember) {
       opts.neighbours = 0;

@@ -47,8 +47,12 @@ struct Fuzz : testing::TestWithParam<uint64_t> {
   template <class M> std::vector<uint8_t> broken(const M& m) {
     std::vector<uint8_t> bytes = bytes_of(m);
     switch (below(4)) {
-      case 0: bytes.resize(static_cast<size_t>(below(static_cast<int>(bytes.size()) + 64))); break;
-      case 1: bytes[static_cast<size_t>(below(8))] ^= static_cast<uint8_t>(1 + below(255)); break;  // fingerprint
+      case 0:
+        bytes.resize(static_cast<size_t>(below(static_cast<int>(bytes.size()) + 64)));
+        break;
+      case 1:
+        bytes[static_cast<size_t>(below(8))] ^= static_cast<uint8_t>(1 + below(255));
+        break;  // fingerprint
       case 2:
         for (int i = below(20); i >= 0; --i) bytes[8 + random() % (bytes.size() - 8)] ^= static_cast<uint8_t>(random());
         break;

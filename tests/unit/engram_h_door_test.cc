@@ -38,8 +38,9 @@ TEST(Door, EveryValueHasItsOwnText) {
   for (int i = 0; i <= ENGRAM_ERROR_TABLES; ++i) texts.insert(engram_error_text(static_cast<engram_error>(i)));
   for (int i = 0; i < ENGRAM_STATUS_COUNT; ++i) texts.insert(engram_status_text(static_cast<engram_status>(i)));
   EXPECT_EQ(texts.size(), size_t{ENGRAM_ERROR_TABLES + 1 + ENGRAM_STATUS_COUNT});
-  for (const char* t : {engram_error_text(static_cast<engram_error>(99)), engram_status_text(static_cast<engram_status>(99)),
-                        engram_rung_text(static_cast<engram_rung>(99)), engram_candidate_text(static_cast<engram_candidate>(99))}) {
+  for (const char* t :
+       {engram_error_text(static_cast<engram_error>(99)), engram_status_text(static_cast<engram_status>(99)),
+        engram_rung_text(static_cast<engram_rung>(99)), engram_candidate_text(static_cast<engram_candidate>(99))}) {
     EXPECT_NE(std::string(t).find("unknown"), std::string::npos);
   }
   EXPECT_STREQ(engram_rung_text(ENGRAM_RUNG_OFF), "off");

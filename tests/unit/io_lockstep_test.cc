@@ -92,11 +92,21 @@ TEST(Lockstep, TroubleChangesNothing) {
   const auto garbage = [&](int i) {
     engram_msg_state_t m = state_message(noisy.plant, noisy.seq + 1);
     switch (i % 5) {
-      case 0: m.robot_digest ^= 2; break;
-      case 1: m.nv = 9; break;
-      case 2: m.seq = 0; break;
-      case 3: noisy.state(task_message(kTaskNear, 0, 7, 7)); return;
-      default: noisy.lockstep.on_state("short", 5); return;
+      case 0:
+        m.robot_digest ^= 2;
+        break;
+      case 1:
+        m.nv = 9;
+        break;
+      case 2:
+        m.seq = 0;
+        break;
+      case 3:
+        noisy.state(task_message(kTaskNear, 0, 7, 7));
+        return;
+      default:
+        noisy.lockstep.on_state("short", 5);
+        return;
     }
     noisy.state(m);
   };

@@ -43,8 +43,8 @@ TEST_F(FeedbackTest, GainsAreMinusTheSlopeOfTheTorque) {
   PandaController c(&options);
   go(c);
   const engram_description& about = *engram_describe(&engram_panda_reach);
-  std::vector<double> K(static_cast<size_t>(about.knots * about.nu * 2 * about.nv)), x(static_cast<size_t>((about.knots + 1) * 14)),
-      u(static_cast<size_t>(about.knots * about.nu));
+  std::vector<double> K(static_cast<size_t>(about.knots * about.nu * 2 * about.nv)),
+      x(static_cast<size_t>((about.knots + 1) * 14)), u(static_cast<size_t>(about.knots * about.nu));
   std::vector<int64_t> utime(static_cast<size_t>(about.knots + 1));
   ASSERT_EQ(engram_plan(c.handle, utime.data(), x.data(), u.data(), K.data()), about.knots);
   EXPECT_EQ(utime[0], plant.utime);
