@@ -61,9 +61,9 @@ TEST(Lockstep, TwoRunsGiveTheSameBytes) {
   for (Session* s : {&a, &b}) {
     s->run(25);
     s->task(kTaskNear, 1, 1);
-    s->run(250);
+    s->run(100);
     s->task(kTaskRight, 2, 2);
-    s->run(250);
+    s->run(100);
   }
   ASSERT_EQ(a.wire.sent.size(), b.wire.sent.size());
   for (size_t i = 0; i < a.wire.sent.size(); ++i) {
@@ -112,17 +112,17 @@ TEST(Lockstep, TroubleChangesNothing) {
   };
   quiet.task(kTaskNear, 1, 1);
   noisy.task(kTaskNear, 1, 1);
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 150; ++i) {
     garbage(i);
     quiet.run(1);
     noisy.run(1);
     ASSERT_EQ(quiet.wire.last(io::kCommandChannel), noisy.wire.last(io::kCommandChannel));
   }
-  EXPECT_EQ(noisy.report.count(Trouble::kRobotDigest), 60);
-  EXPECT_EQ(noisy.report.count(Trouble::kShape), 60);
-  EXPECT_EQ(noisy.report.count(Trouble::kOutOfOrder), 60);
-  EXPECT_EQ(noisy.report.count(Trouble::kForeign), 60);
-  EXPECT_EQ(noisy.report.count(Trouble::kSize), 60);
+  EXPECT_EQ(noisy.report.count(Trouble::kRobotDigest), 30);
+  EXPECT_EQ(noisy.report.count(Trouble::kShape), 30);
+  EXPECT_EQ(noisy.report.count(Trouble::kOutOfOrder), 30);
+  EXPECT_EQ(noisy.report.count(Trouble::kForeign), 30);
+  EXPECT_EQ(noisy.report.count(Trouble::kSize), 30);
 }
 
 TEST(Lockstep, ABadStateIsAnsweredSafely) {
@@ -140,13 +140,13 @@ TEST(Lockstep, ARestartedPlantFindsAFreshController) {
   Session s, fresh;
   s.run(25);
   s.task(kTaskNear, 1, 1);
-  s.run(500);
+  s.run(200);
   s.plant = PandaPlant();
   s.seq = 0;
   for (Session* each : {&s, &fresh}) {
     each->run(25);
     each->task(kTaskRight, 1, 1);
-    each->run(300);
+    each->run(100);
   }
   EXPECT_EQ(s.report.count(Trouble::kRestart), 1);
   EXPECT_EQ(s.wire.last(io::kCommandChannel), fresh.wire.last(io::kCommandChannel));
@@ -156,13 +156,13 @@ TEST(Lockstep, ATaskSentJustBeforeTheRobotIsSetBackStays) {
   Session s;
   s.run(25);
   s.task(kTaskNear, 1, 1);
-  s.run(500);
+  s.run(200);
   const int64_t now = s.plant.utime;
   s.plant = PandaPlant();  // set back to its start, while its clock goes on
   s.plant.utime = now;
   s.seq = 0;
   s.task(kTaskRight, 2, 2);
-  s.run(300);
+  s.run(60);
   const engram_cycle cycle = s.controller.cycle();
   EXPECT_EQ(cycle.jump, 2);
   EXPECT_NEAR(cycle.path[cycle.npath - 1][1], kTaskRight[1], 0.02);  // where the plan ends
@@ -172,11 +172,11 @@ TEST(Lockstep, AControllerThatStartsInTheMiddleTakesOver) {
   Session s, late;
   s.run(25);
   s.task(kTaskNear, 1, 1);
-  s.run(500);
+  s.run(200);
   late.plant = s.plant;
   late.seq = s.seq;
   late.task(kTaskNear, 1, 1);
-  late.run(300);
+  late.run(60);
   const engram_cycle cycle = late.controller.cycle();
   EXPECT_EQ(cycle.rung, ENGRAM_RUNG_PLAN);
   EXPECT_NEAR(cycle.path[cycle.npath - 1][1], kTaskNear[1], 0.02);  // where the plan ends

@@ -14,8 +14,10 @@ constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 const double kBad[7] = {0, 0, kNaN, 0, 0, 0, 0};
 
-double hand_error(const engram_cycle& c, const double* task) {
-  return std::hypot(c.path[0][0] - task[0], c.path[0][1] - task[1], c.path[0][2] - task[2]);
+// Distance of the planned hand at a knot from the target.
+double hand_error(const engram_cycle& c, int knot, const double* task) {
+  const double* const p = c.path[knot];
+  return std::hypot(p[0] - task[0], p[1] - task[1], p[2] - task[2]);
 }
 
 class LadderTest : public testing::Test {
@@ -39,20 +41,20 @@ class LadderTest : public testing::Test {
 };
 
 TEST_F(LadderTest, HoldsWithoutATask) {
-  run(500);
+  run(100);
   EXPECT_EQ(controller.cycle().status, ENGRAM_NO_TASK);
   EXPECT_EQ(controller.cycle().rung, ENGRAM_RUNG_HOLD);
   for (int i = 0; i < 7; ++i) EXPECT_NEAR(plant.q[i], PandaPlant::R::q_home[i], 1e-6);  // gravity is compensated exactly
 }
 
-TEST_F(LadderTest, PlanReachesTheTarget) {
+TEST_F(LadderTest, ThePlanEndsAtTheTarget) {
   run(20);
   EXPECT_EQ(task(kTaskNear, 1), ENGRAM_CONVERGED);
-  run(1800);
+  run(200);
   const engram_cycle c = controller.cycle();
   EXPECT_EQ(c.rung, ENGRAM_RUNG_PLAN);
   EXPECT_EQ(c.jump, 1);
-  EXPECT_LT(hand_error(c, kTaskNear), 0.01);  // the tolerance of the task
+  EXPECT_LT(hand_error(c, c.npath - 1, kTaskNear), 0.01);  // the tolerance of the task
   EXPECT_GT(c.clearance, 0.0);
 }
 
@@ -181,16 +183,16 @@ TEST_F(LadderTest, ATargetOutOfReachIsApproachedWithoutAlarm) {
   const double far[7] = {2.0, 0.0, 0.5, 1, 0, 0, 0};
   EXPECT_EQ(task(far, 1), ENGRAM_TASK_FAR);
   double nearest = 1e3;
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 25; ++i) {
     run(10);
     const engram_cycle c = controller.cycle();
     for (int k = 0; k < c.nguess; ++k) EXPECT_NE(c.guess[k], ENGRAM_CANDIDATE_KNN);  // the memory was not asked
     if (c.rung == ENGRAM_RUNG_PLAN) {
       EXPECT_GT(c.clearance, 0.0);
     }
-    nearest = std::min(nearest, hand_error(c, far));
+    nearest = std::min(nearest, hand_error(c, 0, far));
   }
-  EXPECT_LT(nearest, 1.7);  // m: from 1.69 at home; the shelf stands in the way
+  EXPECT_LT(nearest, 1.7);  // m: 1.69 at home; the shelf stands in the way
   // and back to work
   EXPECT_EQ(task(kTaskNear, 2), ENGRAM_CONVERGED);
   run(100);
@@ -201,7 +203,7 @@ TEST_F(LadderTest, APlanThroughAnObstacleIsNotExecuted) {
   run(20);
   const double inside[7] = {0.62, 0.0, 0.40, 1, 0, 0, 0};  // inside the middle board of the shelf
   task(inside, 1);
-  for (int i = 0; i < 60; ++i) {
+  for (int i = 0; i < 25; ++i) {
     run(10);
     const engram_cycle c = controller.cycle();
     if (c.rung == ENGRAM_RUNG_PLAN) {
