@@ -44,7 +44,7 @@ namespace engram::test {
 namespace {
 
 // Bytes of the static memory of one controller. Raise it only with a reason in the commit.
-constexpr size_t kControllerBudget = 1300000;
+constexpr size_t kControllerBudget = 1000000;
 
 // The last command, and nothing else: a sender without a heap.
 struct LastCommand {
