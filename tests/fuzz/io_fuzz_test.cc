@@ -115,7 +115,7 @@ TEST_P(Fuzz, NumbersOfAnyKind) {
   EXPECT_EQ(controller.cycle().rung, ENGRAM_RUNG_PLAN);
 }
 
-INSTANTIATE_TEST_SUITE_P(Seeds, Fuzz, testing::Range<uint64_t>(1, 4));
+INSTANTIATE_TEST_SUITE_P(Seeds, Fuzz, testing::Range<uint64_t>(1, 5));
 
 }  // namespace
 }  // namespace engram::test
