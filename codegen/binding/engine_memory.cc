@@ -40,7 +40,7 @@ template <class Tab> struct HeldTable {
     const nb::object fields = source.attr("fields")();
     const auto integer = [&fields](const char* key) { return nb::cast<int>(fields[key]); };
     const auto number = [&fields](const char* key) { return nb::cast<float>(nb::float_(fields[key])); };
-    const auto array = [&head](int i) { return head.array[i].data; };
+    const auto array = [&head](int i) { return static_cast<const float*>(head.array[i].data); };
     if constexpr (std::is_same_v<Tab, TabKnn>) {
       table.n = integer("n"), table.d = integer("d"), table.m = integer("m");
       table.scale = array(2), table.x = array(3), table.value = array(4);

@@ -190,7 +190,7 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
   answer.n = memory::find_lines(tables, opts, goal, x0, neighbours, w, answer);
   for (int i = 0; i < answer.n; ++i) memory::judge<Task>(tables, w.slot[i], answer.guess[i]);
   tab_rbf_basis(tables.time, n + 1, t, w.basis, nullptr);
-  const double T = tables.time->head.array[1].data[0];
+  const double T = tab_hi(&tables.time->head)[0];
   for (int first = 0; first < answer.n; first += kLanes) {
     const int lanes = answer.n - first < kLanes ? answer.n - first : kLanes;
     Pack end[nq];

@@ -74,7 +74,7 @@ uint64_t tab_digest(const TabHead* head) {
     hash = fnv1a(fnv1a(hash, static_cast<uint32_t>(a.count)), static_cast<uint32_t>(a.count >> 32));
     for (uint64_t j = 0; j < a.count; ++j) {
       uint32_t word;
-      std::memcpy(&word, a.data + j, sizeof word);
+      std::memcpy(&word, static_cast<const char*>(a.data) + 4 * j, sizeof word);
       hash = fnv1a(hash, word);
     }
   }
@@ -110,8 +110,8 @@ TabStatus tab_check(const TabHead* head, TabKind kind, uint64_t robot_digest, ui
 }
 
 TabStatus tab_domain(const TabHead* head, const double* x) {
-  const float* lo = head->array[0].data;
-  const float* hi = head->array[1].data;
+  const float* lo = tab_lo(head);
+  const float* hi = tab_hi(head);
   TabStatus status = kTabOk;
   for (int i = 0; i < head->nin; ++i) {
     // as a float the query may overflow where the double does not

@@ -1,7 +1,8 @@
 /* Tables: read-only data compiled offline, and what all kinds of them have in common. Plain C11; knows no robot.
  *
  * A table is one `const` struct of its kind (tab_knn.h, tab_gpr.h, ...) whose first member is a TabHead. Its data are arrays
- * of 32-bit floats, padded to TAB_LANES and aligned to 64 bytes, so that every evaluator's inner loop is a run of full vectors.
+ * of 32-bit floats, some of them stored smaller where the kind allows it (TabType), padded to TAB_LANES and aligned to 64 bytes, so
+ * that every evaluator's inner loop is a run of full vectors.
  * Evaluators never allocate, never fail silently and answer outside the domain too, but say so in their TabStatus.
  */
 #ifndef CONTROLLER_TAB_TAB_H_
@@ -32,10 +33,17 @@ typedef enum TabStatus {
   kTabBad = 3,       /* the table does not belong here, or its bytes have changed (tab_check only) */
 } TabStatus;
 
-/* One array of a table: `count` floats. */
+/* How the numbers of an array are stored; which arrays may be smaller than float32, and of which type they are, the kind's struct says. */
+typedef enum TabType {
+  kTabFloat32 = 0,
+  kTabFloat16 = 1, /* IEEE half precision without denormals: 11 bits, 6.1e-5 .. 65504 */
+  kTabInt8 = 2,    /* -127 .. 127, times a scale that the kind's struct holds */
+} TabType;
+
+/* One array of a table: `count` 32-bit words, whatever its type. */
 typedef struct TabArray {
   const char* name;
-  const float* data;
+  const void* data;
   uint64_t count;
 } TabArray;
 
@@ -56,7 +64,7 @@ typedef struct TabHead {
   TabArray array[TAB_ARRAYS];    /* array[0], array[1]: domain lo and hi (nin each); then the kind's own */
 } TabHead;
 
-/* FNV-1a over the arrays' counts and their floats as 32-bit words: every single-word change alters it. Init only.
+/* FNV-1a over the arrays' counts and their 32-bit words: every single-word change alters it. Init only.
  * O(words): about 1 ns each. */
 uint64_t tab_digest(const TabHead* head);
 
@@ -64,6 +72,10 @@ uint64_t tab_digest(const TabHead* head);
  * table, what differs and the mend. Compares schema, kind, robot and task digest, recomputes the data digest and checks that the
  * array sizes fit the kind. An expected digest of 0 accepts any. Init only. */
 TabStatus tab_check(const TabHead* head, TabKind kind, uint64_t robot_digest, uint64_t task_digest, char* text);
+
+/* Domain of the inputs (nin), in the units of input_unit. */
+static inline const float* tab_lo(const TabHead* head) { return (const float*)head->array[0].data; }
+static inline const float* tab_hi(const TabHead* head) { return (const float*)head->array[1].data; }
 
 /* kTabOk, kTabOutside or kTabNotFinite for the inputs x (nin), in the units of input_unit. */
 TabStatus tab_domain(const TabHead* head, const double* x);
@@ -73,6 +85,12 @@ static inline TabStatus tab_worse(TabStatus a, TabStatus b) { return a > b ? a :
 
 /* n rounded up to whole vectors. */
 static inline int32_t tab_pad(int32_t n) { return (n + TAB_LANES - 1) / TAB_LANES * TAB_LANES; }
+
+/* 32-bit words that hold `count` numbers of a type. */
+static inline int64_t tab_words(int32_t type, int64_t count) {
+  const int64_t size = type == kTabFloat32 ? 4 : type == kTabFloat16 ? 2 : 1;
+  return (count * size + 3) / 4;
+}
 
 const char* tab_kind_text(uint32_t kind); /* TabKind */
 const char* tab_status_text(TabStatus status);

@@ -5,6 +5,7 @@
 #include "controller/tab/tab.h"
 
 #include <cstring>
+#include <type_traits>
 
 namespace engram {
 
@@ -20,6 +21,44 @@ inline TabLanes tab_load(const float* p) {
 }
 inline void tab_store(float* p, const TabLanes& v) { std::memcpy(p, &v, sizeof v); }
 inline TabLanes tab_fill(float s) { return TabLanes{} + s; }
+
+// Eight half floats or signed bytes, as floats (the caller multiplies by their scale). Halves are moved into the place of a float's
+// bits and their exponent is moved by 112; there are no infinities or denormals among them (engram.emit).
+inline TabLanes tab_load_half(const uint16_t* p) {
+  typedef uint16_t Halves __attribute__((vector_size(TAB_LANES * sizeof(uint16_t))));
+  typedef uint32_t Words __attribute__((vector_size(TAB_LANES * sizeof(uint32_t))));
+  Halves half;
+  std::memcpy(&half, p, sizeof half);
+  const Words wide = __builtin_convertvector(half, Words);
+  const Words size = wide & 0x7fff, sign = wide & 0x8000;
+  const Words bits = (size << 13) + (reinterpret_cast<Words>(size != 0) & (112u << 23)) + (sign << 16);
+  TabLanes v;
+  std::memcpy(&v, &bits, sizeof v);
+  return v;
+}
+inline TabLanes tab_load_byte(const int8_t* p) {
+  typedef int8_t Bytes __attribute__((vector_size(TAB_LANES)));
+  Bytes byte;
+  std::memcpy(&byte, p, sizeof byte);
+  return __builtin_convertvector(byte, TabLanes);
+}
+
+// Eight numbers of an array of a type, from number i on.
+template <int type> inline TabLanes tab_load_as(const void* data, int64_t i) {
+  if constexpr (type == kTabFloat32) return tab_load(static_cast<const float*>(data) + i);
+  else if constexpr (type == kTabFloat16) return tab_load_half(static_cast<const uint16_t*>(data) + i);
+  else return tab_load_byte(static_cast<const int8_t*>(data) + i);
+}
+
+// f(integral constant of the type): one instance of an inner loop for every type.
+template <class F> inline auto tab_with_type(int32_t type, F f) {
+  switch (type) {
+    case kTabFloat16: return f(std::integral_constant<int, kTabFloat16>());
+    case kTabInt8: return f(std::integral_constant<int, kTabInt8>());
+    default: return f(std::integral_constant<int, kTabFloat32>());
+  }
+}
+
 inline float tab_sum(const TabLanes& v) { return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7])); }
 
 // Squared distances of the scaled query to the eight samples of one block (d, 8). Two accumulators hide the latency of the additions.

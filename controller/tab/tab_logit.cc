@@ -6,8 +6,8 @@ extern "C" TabStatus tab_logit_eval(const TabLogit* tab, const double* x, double
   *probability = 0;
   const TabStatus status = tab_domain(&tab->head, x);
   if (status == kTabNotFinite) return status;
-  const float* lo = tab->head.array[0].data;
-  const float* hi = tab->head.array[1].data;
+  const float* lo = tab_lo(&tab->head);
+  const float* hi = tab_hi(&tab->head);
   double score = tab->bias;
   for (int32_t i = 0; i < tab->d; ++i) score += tab->weight[i] * std::fmin(std::fmax(x[i], double{lo[i]}), double{hi[i]});
   *probability = 1.0 / (1.0 + std::exp(-score));

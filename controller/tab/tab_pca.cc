@@ -7,8 +7,8 @@
 using namespace engram;
 
 extern "C" TabStatus tab_pca_decode(const TabPca* tab, const float* z, float* y) {
-  const float* lo = tab->head.array[0].data;
-  const float* hi = tab->head.array[1].data;
+  const float* lo = tab_lo(&tab->head);
+  const float* hi = tab_hi(&tab->head);
   const int32_t n_pad = tab_pad(tab->n);
   std::memcpy(y, tab->mean, sizeof(float) * n_pad);
   TabStatus status = kTabOk;

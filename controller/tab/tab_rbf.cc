@@ -9,7 +9,7 @@ using engram::TabDoubles;
 extern "C" {
 
 TabStatus tab_rbf_basis(const TabRbf* tab, int32_t nt, const double* t, double* phi, double* dphi) {
-  const double lo = tab->head.array[0].data[0], hi = tab->head.array[1].data[0];
+  const double lo = tab_lo(&tab->head)[0], hi = tab_hi(&tab->head)[0];
   const double inv_width = 1.0 / tab->width;
   const int32_t k = tab->k;
   TabStatus status = kTabOk;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from engram.cli import main
 from engram.emit import Knn, Logit, read_folder, write_tables
-from engram.emit.arrays import array, blocks, pad, triangle, unblocks
+from engram.emit.arrays import Array, array, blocks, pad, restored, stored, triangle, unblocks
 from engram.emit.read import faults
 from engram.emit.write import c_float
 from engram.inputs import InputError
@@ -61,6 +62,40 @@ def test_layouts() -> None:
     assert np.array_equal(unblocks(rows, 11, 2), x) and np.all(rows[2:, 3:] == 1e15)
     lower = np.tril(np.ones((9, 9)))
     assert triangle(lower).size == 8 * 8 + 16 and triangle(lower).sum() == 45 and pad(9) == 16
+
+
+@pytest.mark.parametrize(("type", "loss"), [("float32", 2.0**-24), ("float16", 2.0**-11), ("int8", 0.5 / 127)])
+def test_a_stored_matrix_loses_what_its_type_must(type: str, loss: float) -> None:
+    values = np.random.default_rng(2).normal(size=(30, 11)) * np.geomspace(1e-6, 1e6, 11)
+    matrix, scale = stored("w", "", values, type)
+    back = restored(matrix, scale)[:, :11]
+    # relative to the largest number of a column; scale and product are float32
+    assert np.all(np.abs(back - values) <= (loss + 2.0**-22) * np.abs(values).max(axis=0))
+    assert matrix.type == type and matrix.words.size == {"float32": 480, "float16": 240, "int8": 120}[type]
+    assert not stored("w", "", np.zeros((2, 3)), type)[0].rows.any()
+
+
+@dataclass(kw_only=True)
+class Typed(Logit):
+    """A table with an array of every type, as no evaluator has it."""
+
+    rows: int
+
+    def own_arrays(self) -> list[Array]:
+        values = np.random.default_rng(3).normal(size=(self.rows, 8))
+        return [a for type in ("float16", "int8") for a in stored(type, "", values, type)]
+
+
+@pytest.mark.parametrize("rows", [3, 20_000])  # as C text, as blobs
+def test_stored_arrays_are_read_back(tmp_path: Path, rows: int) -> None:
+    logit = tables()[1]
+    table = Typed(weight=logit.weight, bias=0, rows=rows, inputs=logit.inputs, lo=logit.lo, hi=logit.hi, held_out_error=0,
+                  held_out_text="")  # fmt: skip
+    write_tables(tmp_path, NAME, [table], robot_digest=1, task_digest=2, data_digest="", provenance="")
+    assert faults(tmp_path) == []
+    (found,) = read_folder(tmp_path)[1]
+    for a, b in zip(found.arrays, table.arrays(), strict=True):
+        assert (a.name, a.type) == (b.name, b.type) and np.array_equal(a.flat, b.flat)
 
 
 def test_same_tables_same_bytes(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Arrays as the evaluators read them: float32, padded to whole vectors, and their digest."""
+"""Arrays as the evaluators read them: float32, or stored smaller; padded to whole vectors; and their digest."""
 
 from __future__ import annotations
 
@@ -20,13 +20,28 @@ def pad(n: int) -> int:
     return -(-n // LANES) * LANES
 
 
+TYPES = {"float32": 0, "float16": 1, "int8": 2}  # TabType
+C_TYPES = {"float32": "float", "float16": "uint16_t", "int8": "int8_t"}
+PLURALS = {"float32": "floats", "float16": "halves", "int8": "bytes"}
+
+
 @dataclass(frozen=True)
 class Array:
-    """One array of a table: name, one line about its shape, and float32 rows (2-D: a row is a line of text)."""
+    """One array of a table: name, one line about its shape, and rows of one of the TYPES (2-D: a row is a line of text)."""
 
     name: str
     about: str
     rows: np.ndarray
+
+    @property
+    def type(self) -> str:
+        """How the numbers are stored."""
+        return self.rows.dtype.name
+
+    @property
+    def words(self) -> np.ndarray:
+        """The bytes in memory as 32-bit words."""
+        return np.frombuffer(self.rows.tobytes(), "<u4")
 
     @property
     def flat(self) -> np.ndarray:
@@ -43,6 +58,33 @@ def array(name: str, about: str, values: np.ndarray) -> Array:
         raise ValueError(f"array '{name}' holds numbers that are not finite as float32")
     rows[np.abs(rows) < np.finfo(np.float32).tiny] = 0.0
     return Array(name, about, np.ascontiguousarray(rows))
+
+
+def stored(name: str, about: str, values: np.ndarray, type: str = "float32") -> tuple[Array, Array]:
+    """A matrix (n, m) in the type asked for, rows padded, and the scale (pad(m)) of its columns: number = stored * scale.
+
+    float16 and int8 scale every column to its largest number; float32 keeps the numbers (scale 1).
+    """
+    values = padded_rows(np.asarray(values, np.float64))
+    largest = np.maximum(np.abs(values).max(axis=0), 1e-30)
+    if type == "float32":
+        matrix, scale = array(name, about, values), np.ones(len(largest))
+    elif type == "float16":
+        scale = np.float32(largest)
+        rows = (values / scale).astype(np.float16)
+        rows[np.abs(rows) < np.finfo(np.float16).tiny] = 0.0
+        matrix = Array(name, about, rows)
+    elif type == "int8":
+        scale = np.float32(largest / 127)
+        matrix = Array(name, about, np.rint(values / scale).astype(np.int8))
+    else:
+        raise ValueError(f"array '{name}': type '{type}' is none of {', '.join(TYPES)}")
+    return matrix, array(f"{name}_scale", f"(pad(m)) scale of each column of {name}", scale)
+
+
+def restored(matrix: Array, scale: Array) -> np.ndarray:
+    """The numbers that an evaluator sees in a stored matrix, as double."""
+    return matrix.rows.astype(np.float64) * scale.flat.astype(np.float64)
 
 
 def padded_rows(values: np.ndarray) -> np.ndarray:
@@ -84,8 +126,8 @@ def words64(number: int) -> list[int]:
 
 
 def digest(arrays: list[Array]) -> int:
-    """FNV-1a over counts and floats as 32-bit words: tab_digest of controller/tab/tab.h."""
+    """FNV-1a over counts and 32-bit words: tab_digest of controller/tab/tab.h."""
     value = FNV_OFFSET
     for item in arrays:
-        value = fnv1a([*words64(item.flat.size), *item.flat.view(np.uint32).tolist()], value)
+        value = fnv1a([*words64(item.words.size), *item.words.tolist()], value)
     return value

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import numpy as np
 
-from engram.emit.arrays import Array, digest
+from engram.emit.arrays import C_TYPES, Array, digest
 from engram.inputs import InputError, read_text
 from engram.paths import relative
 
 MEND = "run 'make tables'"
-ARRAY = re.compile(r"static const float \w+_v\d+_(\w+)\[(\d+)\] = \{\n(.*?),\n\};", re.DOTALL)
-BLOB = re.compile(r"extern const float (\w+_v\d+_(\w+))\[(\d+)\]")
+ARRAY = re.compile(r"static const (\w+) \w+_v\d+_(\w+)\[(\d+)\] = \{\n(.*?),\n\};", re.DOTALL)
+BLOB = re.compile(r"extern const (\w+) (\w+_v\d+_(\w+))\[(\d+)\]")
+TYPES = {c_type: np.dtype(name).newbyteorder("<") for name, c_type in C_TYPES.items()}
 
 
 @dataclass
@@ -47,6 +48,14 @@ def read_manifest(folder: Path) -> dict:
         raise InputError(f"{relative(path)}: not valid JSON ({error}); {MEND}") from None
 
 
+def parsed(c_type: str, literals: list[str]) -> np.ndarray:
+    """Numbers of an array from its C text."""
+    if c_type == "float":
+        return np.array([float.fromhex(literal.rstrip("f")) for literal in literals], np.float32)
+    numbers = [int(literal, 0) for literal in literals]
+    return np.array(numbers, np.int8) if c_type == "int8_t" else np.array(numbers, np.uint16).view(np.float16)
+
+
 def read_table(folder: Path, entry: dict) -> TableFile:
     """The table of one manifest entry."""
     path = folder / f"{entry['name']}.c"
@@ -59,16 +68,15 @@ def read_table(folder: Path, entry: dict) -> TableFile:
         return int(found.group(1), 16)
 
     values: dict[str, np.ndarray] = {}
-    for name, count, body in ARRAY.findall(source):
-        numbers = [float.fromhex(word.rstrip("f")) for word in body.replace(",", " ").split()]
-        values[name] = np.array(numbers, dtype=np.float32)
-        if len(numbers) != int(count):
-            raise InputError(f"{relative(path)}: array '{name}' holds {len(numbers)} numbers, not {count}; {MEND}")
-    for stem, name, count in BLOB.findall(source):
-        blob = folder / f"{stem}.bin"
-        if not blob.is_file() or blob.stat().st_size != 4 * int(count):
-            raise InputError(f"{relative(blob)}: missing or not {4 * int(count)} bytes long; {MEND}")
-        values[name] = np.fromfile(blob, dtype="<f4")
+    for c_type, name, count, body in ARRAY.findall(source):
+        values[name] = parsed(c_type, body.replace(",", " ").split())
+        if len(values[name]) != int(count):
+            raise InputError(f"{relative(path)}: array '{name}' holds {len(values[name])} numbers, not {count}; {MEND}")
+    for c_type, stem, name, count in BLOB.findall(source):
+        blob, size = folder / f"{stem}.bin", int(count) * TYPES[c_type].itemsize
+        if not blob.is_file() or blob.stat().st_size != size:
+            raise InputError(f"{relative(blob)}: missing or not {size} bytes long; {MEND}")
+        values[name] = np.fromfile(blob, TYPES[c_type], int(count))
     order = re.findall(r'^ +\{"(\w+)", \w+, \d+\},$', source, re.MULTILINE)
     if sorted(order) != sorted(values):
         raise InputError(f"{relative(path)}: its list of arrays does not match its arrays; {MEND}")

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from engram.emit.arrays import LANES, SCHEMA, Array, digest
+from engram.emit.arrays import C_TYPES, LANES, PLURALS, SCHEMA, Array, digest
 from engram.emit.kinds import Table
 
 TEXT_LIMIT = 128 * 1024  # bytes of C text; a larger array becomes a blob
@@ -23,6 +23,13 @@ def c_float(value: float) -> str:
     return f"{mantissa.rstrip('0').rstrip('.')}p{exponent}f"
 
 
+def c_literal(value: np.generic) -> str:
+    """One stored number: a float32 in hexadecimal, a float16 as its bits, an int8 as it is."""
+    if value.dtype == np.float32:
+        return c_float(value)
+    return f"0x{value.view(np.uint16):04x}" if value.dtype == np.float16 else str(value)
+
+
 def c_text(text: str) -> str:
     """A C string literal."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'
@@ -32,7 +39,7 @@ def table_text(item: Array) -> str:
     """The numbers of an array, a row a line, at most LANES numbers in one."""
     lines = []
     for row in item.rows:
-        literals = [c_float(value) for value in row.tolist()]
+        literals = [c_literal(value) for value in row]
         lines += [", ".join(literals[i : i + LANES]) for i in range(0, len(literals), LANES)]
     return "  " + ",\n  ".join(lines)
 
@@ -42,21 +49,22 @@ def render(table: Table, symbol: str, prefix: str, robot_digest: int, task_diges
     arrays = table.arrays()
     files: dict[str, bytes] = {}
     struct = f"Tab{table.kind.capitalize()}"
-    nbytes = 4 * sum(a.flat.size for a in arrays)
+    nbytes = 4 * sum(a.words.size for a in arrays)
     bodies, blobs = [], []
     for a in arrays:
         text = table_text(a)
         if len(text) <= TEXT_LIMIT:
             bodies.append(
-                f"/* {a.about} */\n_Alignas(64) static const float {symbol}_{a.name}[{a.flat.size}] = {{\n{text},\n}};\n"
+                f"/* {a.about} */\n"
+                f"_Alignas(64) static const {C_TYPES[a.type]} {symbol}_{a.name}[{a.flat.size}] = {{\n{text},\n}};\n"
             )
             continue
         blob = f"{symbol}_{a.name}.bin"
-        files[blob] = a.flat.astype("<f4").tobytes()
+        files[blob] = a.words.tobytes()
         blobs.append((f"{symbol}_{a.name}", blob))
         bodies.append(
-            f"/* {a.about}: little-endian floats in {blob} */\n"
-            f'extern const float {symbol}_{a.name}[{a.flat.size}] __attribute__((visibility("hidden")));\n'
+            f"/* {a.about}: little-endian {PLURALS[a.type]} in {blob} */\n"
+            f'extern const {C_TYPES[a.type]} {symbol}_{a.name}[{a.flat.size}] __attribute__((visibility("hidden")));\n'
         )
     if blobs:
         parts = [
@@ -87,7 +95,7 @@ def render(table: Table, symbol: str, prefix: str, robot_digest: int, task_diges
         f".held_out_text = {c_text(table.held_out_text)}",
         f".provenance = {c_text(provenance)}",
         f".narray = {len(arrays)}",
-        ".array = {\n" + "".join(f'      {{"{a.name}", {symbol}_{a.name}, {a.flat.size}}},\n' for a in arrays) + "    }",
+        ".array = {\n" + "".join(f'      {{"{a.name}", {symbol}_{a.name}, {a.words.size}}},\n' for a in arrays) + "    }",
     ]
     scalars = [f".{k} = {c_float(v) if isinstance(v, np.float32) else v}" for k, v in table.fields().items()]
     pointers = [f".{a.name} = {symbol}_{a.name}" for a in arrays[2:]]
@@ -143,7 +151,7 @@ def write_tables(
                 "name": symbol,
                 "kind": table.kind,
                 "digest": f"0x{digest(arrays):016x}",
-                "bytes": 4 * sum(a.flat.size for a in arrays),
+                "bytes": 4 * sum(a.words.size for a in arrays),
                 "sizes": {k: (float(v) if isinstance(v, np.float32) else int(v)) for k, v in table.fields().items()},
                 "held_out_error": float(np.float32(table.held_out_error)),
                 "held_out_text": table.held_out_text,
