@@ -289,16 +289,8 @@ template <int N> class AnymalTrot {
 
 // ---- Hector --------------------------------------------------------------------------------------------------------------
 
-// Four thrusters 0.1525 m from the centre, alternately turning; each pulls along z and twists by 1/66 m of its thrust.
-struct HectorFlyer : robots::Hector {
-  static constexpr int nu = 4;
-  static constexpr double kArm = 0.1525, kTwist = 1e-6 / 6.6e-5;
-  static constexpr double u_max[nu] = {5.0, 5.0, 5.0, 5.0};
-  static constexpr double actuation[6][nu] = {{0, 0, 0, 0},        {0, 0, 0, 0},        {1, 1, 1, 1},
-                                              {0, kArm, 0, -kArm}, {-kArm, 0, kArm, 0}, {-kTwist, kTwist, -kTwist, kTwist}};
-};
-using Hector = Ocp<HectorFlyer, FramePlacementTerm<HectorFlyer, HectorFlyer::kBase>, StateTerm<HectorFlyer>,
-                   ControlTerm<HectorFlyer, false>>;
+using Hector = Ocp<robots::Hector, FramePlacementTerm<robots::Hector, robots::Hector::kBase>, StateTerm<robots::Hector>,
+                   ControlTerm<robots::Hector, false>>;
 inline constexpr int kFlightKnots = 33;
 
 // From rest at the origin to (1, 0, 1), 30 ms knots.
@@ -325,7 +317,7 @@ template <int N> void hector_cold_start(const Horizon<Hector, N>& h, FddpSolutio
   for (int k = 0; k <= h.n; ++k)
     for (int i = 0; i < Hector::nx; ++i) s.x[k][i] = h.x0[i];
   for (int k = 0; k < h.n; ++k)
-    for (int i = 0; i < Hector::nu; ++i) s.u[k][i] = total_mass<HectorFlyer>() * -HectorFlyer::gravity[2] / Hector::nu;
+    for (int i = 0; i < Hector::nu; ++i) s.u[k][i] = total_mass<robots::Hector>() * -robots::Hector::gravity[2] / Hector::nu;
 }
 
 }  // namespace engram::bench

@@ -12,6 +12,7 @@ for description in models/*/*/task.toml; do
   task=$(basename "$(dirname "$description")") robot=$(basename "$(dirname "$(dirname "$description")")")
   "$engram" task "$robot" "$task"
   scripts/setup.sh build
+  grep -q '^kind = "reach"' "$description" || continue  # a motion has no memory to fit
   "$engram" data "$robot" "$task"
   "$engram" fit "$robot" "$task"
   scripts/setup.sh build

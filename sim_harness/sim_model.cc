@@ -62,12 +62,13 @@ std::string Model::load(const char* path) {
   nq = m->nq, nv = m->nv, nu = m->nu;
   if (nq > kMaxDof || nv > kMaxDof) return std::string("the scene '") + path + "' has more than 64 coordinates";
   free_base = m->njnt > 0 && m->jnt_type[0] == mjJNT_FREE;
-  for (int i = 0; i < nu; ++i) {
+  while (nthruster < nu && m->actuator_trntype[nthruster] == mjTRN_SITE) ++nthruster;
+  for (int i = nthruster; i < nu; ++i) {
     const bool fits = m->actuator_trntype[i] == mjTRN_JOINT && m->actuator_gear[6 * i] == 1.0 &&
                       m->jnt_dofadr[m->actuator_trnid[2 * i]] == nv - nu + i;
     if (!fits) {
       return std::string("actuator ") + std::to_string(i) + " of the scene '" + path +
-             "' must drive degree of freedom nv - nu + " + std::to_string(i) + " with gear 1";
+             "' must drive degree of freedom nv - nu + " + std::to_string(i) + " with gear 1 (thrusters on sites come first)";
     }
   }
   const int text = mj_name2id(m, mjOBJ_TEXT, "robot_digest");
@@ -142,7 +143,9 @@ double Model::joint_excess() const {
 double Model::torque_share() const {
   double share = 0;
   for (int i = 0; i < nu; ++i) {
-    if (m->actuator_ctrllimited[i]) share = std::max(share, std::fabs(d->ctrl[i]) / m->actuator_ctrlrange[2 * i + 1]);
+    if (!m->actuator_ctrllimited[i]) continue;
+    const double lo = m->actuator_ctrlrange[2 * i], hi = m->actuator_ctrlrange[2 * i + 1];
+    share = std::max(share, std::fabs(d->ctrl[i] - 0.5 * (hi + lo)) / (0.5 * (hi - lo)));
   }
   return share;
 }

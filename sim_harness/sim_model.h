@@ -28,6 +28,7 @@ struct Model {
   mjModel* m = nullptr;
   mjData* d = nullptr;
   int nq = 0, nv = 0, nu = 0;
+  int nthruster = 0;          // the first controls: propellers on sites of the base
   bool free_base = false;     // joint 0 is a free joint
   int hand_site = -1;         // site that is judged, or -1
   uint64_t robot_digest = 0;  // custom text "robot_digest" of the scene, 0 if it has none
@@ -38,14 +39,14 @@ struct Model {
   Model& operator=(const Model&) = delete;
 
   // Loads an MJCF scene. Returns an empty string, or one line that says what is wrong and what to do.
-  // A scene fits if each of its nu actuators drives, with gear 1, one of the last nu dofs, in order.
+  // A scene fits if its actuators are thrusters on sites, then one motor with gear 1 for each of the last dofs, in order.
   std::string load(const char* path);
   std::string select_hand(const char* site);  // the MJCF site that is judged; same return
 
   // State in the convention of state_t:  q = [p_WB, x y z w, joints],  v = [R_WB' v_lin, w_B, joints].
   void get_state(double* q, double* v) const;
   void set_state(const double* q, const double* v);
-  // Generalised force of the last nu dofs, in the convention of command_t (equal to MuJoCo's: actuators drive joints only).
+  // Thrusts, then forces of the last dofs, in the convention of command_t (equal to MuJoCo's actuators).
   void set_tau(const double* tau);
 
   // The rest needs positions of the current qpos (mj_step1 or mj_forward).
@@ -54,7 +55,7 @@ struct Model {
   int robot_world_contact() const;
   const char* geom_label(int geom) const;  // its name, else its body's
   double joint_excess() const;             // largest distance of a limited joint beyond its range (rad or m), 0 inside
-  double torque_share() const;             // largest |tau_i| / limit_i of the control just set
+  double torque_share() const;  // of the control just set: largest distance from the middle of its range, 1 at the limits
 };
 
 }  // namespace engram::sim

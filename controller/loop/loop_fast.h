@@ -125,8 +125,8 @@ template <class P, int N> bool FastLoop<P, N>::damping_law(const double* v, doub
 template <class P, int N> void FastLoop<P, N>::limit(int64_t utime, double* tau) {
   const double since = 1e-6 * static_cast<double>(std::min<int64_t>(utime - utime_, options_.state_gap_us));
   for (int i = 0; i < nu; ++i) {
-    const double most = R::u_max[i], step = options_.torque_rate * most * since;
-    tau[i] = std::clamp(tau[i], -most, most);
+    const double lo = P::u_lo(i), hi = P::u_hi(i), step = options_.torque_rate * hi * since;
+    tau[i] = std::clamp(tau[i], lo, hi);
     if (commanded_) tau[i] = std::clamp(tau[i], tau_[i] - step, tau_[i] + step);
   }
 }

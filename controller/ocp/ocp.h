@@ -34,8 +34,8 @@ template <class R_, class... Terms> struct Ocp {
     S dt;  // time step [s]; 0 at the terminal knot
   };
 
-  static constexpr double u_lo(int i) { return -R::u_max[i]; }
-  static constexpr double u_hi(int i) { return R::u_max[i]; }
+  static constexpr double u_lo(int i) { return ControlBounds<R>::lo(i); }
+  static constexpr double u_hi(int i) { return ControlBounds<R>::hi(i); }
 
   // x_next = x (+) dx, dx padded
   template <class S> static void integrate(const S* x, const S* dx, S* x_next) {

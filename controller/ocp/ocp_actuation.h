@@ -1,7 +1,7 @@
-// How controls become joint forces: tau = B u.
+// How controls become joint forces, tau = B u, and their bounds, u_lo <= u <= u_hi.
 //
-// By default u drives the last nu dofs. A robot that is driven otherwise (thrusters) says so with a constant
-//   static constexpr double actuation[nv][nu];
+// By default u drives the last nu dofs and u_lo = -u_max. A robot that is driven otherwise (thrusters) says so with constants
+//   static constexpr double actuation[nv][nu], u_lo[nu];
 #ifndef CONTROLLER_OCP_OCP_ACTUATION_H_
 #define CONTROLLER_OCP_OCP_ACTUATION_H_
 
@@ -34,6 +34,15 @@ template <class R> struct Actuation<R, std::void_t<decltype(R::actuation)>> {
     }
   }
   static constexpr double entry(int k, int i) { return R::actuation[k][i]; }
+};
+
+template <class R, class = void> struct ControlBounds {
+  static constexpr double lo(int i) { return -R::u_max[i]; }
+  static constexpr double hi(int i) { return R::u_max[i]; }
+};
+template <class R> struct ControlBounds<R, std::void_t<decltype(R::u_lo)>> {
+  static constexpr double lo(int i) { return R::u_lo[i]; }
+  static constexpr double hi(int i) { return R::u_max[i]; }
 };
 
 }  // namespace engram

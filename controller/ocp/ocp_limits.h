@@ -2,6 +2,7 @@
 #ifndef CONTROLLER_OCP_OCP_LIMITS_H_
 #define CONTROLLER_OCP_OCP_LIMITS_H_
 
+#include "controller/ocp/ocp_actuation.h"
 #include "controller/ocp/ocp_view.h"
 
 namespace engram {
@@ -41,7 +42,8 @@ template <class R> struct LimitTerm {
       const S v_edge = S(R::v_max[i]) * (S(1.0) - p.limit_margin_v);
       f(L::ov + i, p.limit_w_v, excess(k.v[i], -v_edge, v_edge));
     }
-    for (int i = 0; i < R::nu; ++i) f(L::ou + i, p.limit_w_u, excess(k.u[i], S(-R::u_max[i]), S(R::u_max[i])));
+    using U = ControlBounds<R>;
+    for (int i = 0; i < R::nu; ++i) f(L::ou + i, p.limit_w_u, excess(k.u[i], S(U::lo(i)), S(U::hi(i))));
   }
 };
 

@@ -12,8 +12,8 @@ namespace engram::robots {
 
 struct Hector {
   static constexpr char name[] = "hector";
-  static constexpr uint64_t digest = 0x4e702875c2322842;  // of the numbers below
-  static constexpr int nj = 1, nq = 7, nv = 6, nu = 0;
+  static constexpr uint64_t digest = 0x3f36ab04ddf60725;  // of the numbers below
+  static constexpr int nj = 1, nq = 7, nv = 6, nu = 4;
 
   // tree: parent -1 is the world; iq, iv first index in q, v; the subtree of i is [i, i + nsub[i])
   static constexpr const char* joint_name[1] = {"root_joint"};
@@ -77,8 +77,26 @@ struct Hector {
     0x1.7d784p+26,  // root_joint wy
     0x1.7d784p+26,  // root_joint wz
   };
-  static constexpr double u_max[1] = {
-    0.0,  // unused
+  static constexpr double u_max[4] = {
+    0x1.4p+2,  // front
+    0x1.4p+2,  // left
+    0x1.4p+2,  // back
+    0x1.4p+2,  // right
+  };
+  // least controls [N, N m]; tau = actuation u [-, m]
+  static constexpr double u_lo[4] = {
+    0.0,  // front
+    0.0,  // left
+    0.0,  // back
+    0.0,  // right
+  };
+  static constexpr double actuation[6][4] = {
+    {0.0, 0.0, 0.0, 0.0},  // root_joint x
+    {0.0, 0.0, 0.0, 0.0},  // root_joint y
+    {0x1p+0, 0x1p+0, 0x1p+0, 0x1p+0},  // root_joint z
+    {0.0, 0x1.3851eb851eb85p-3, 0.0, -0x1.3851eb851eb85p-3},  // root_joint wx
+    {-0x1.3851eb851eb85p-3, 0.0, 0x1.3851eb851eb85p-3, 0.0},  // root_joint wy
+    {-0x1.f07c1f07c1f07p-7, 0x1.f07c1f07c1f07p-7, -0x1.f07c1f07c1f07p-7, 0x1.f07c1f07c1f07p-7},  // root_joint wz
   };
   static constexpr double q_home[7] = {
     0.0,  // root_joint x

@@ -20,6 +20,15 @@ from engram.robots.spec import read_spec
 from engram.robots.tree import FREE, PRISMATIC, REVOLUTE, build, load, q_from_pin, q_to_pin
 
 ZOO = ROOT / "tests" / "reference" / "zoo"
+THRUSTER = """[thruster.jet]
+link = "base_link"
+position = [0.1, 0.2, 0.3]
+axis = [0.6, 0.0, 0.8]
+twist = -0.1
+u_lo = 0.5
+u_hi = 4.0
+
+"""
 
 
 @pytest.fixture()
@@ -123,7 +132,38 @@ def test_numbers_that_are_not_finite_never_reach_a_table():
         c_double(float("nan"))
 
 
-@pytest.mark.parametrize("name", ["panda", "talos"])
+def test_thrusters_push_where_they_sit(models):
+    """A thrust u along the unit axis a at p is the base wrench [a u, (p x a + twist a) u]; motors follow in their own dofs."""
+    spoil(models, "[spheres]", THRUSTER + "[spheres]")
+    tree = build(read_spec("zoo", models))
+    assert tree.thruster_name == ["jet"] and tree.nu == tree.nv - 6 + 1
+    assert tree.u_lo[0] == 0.5 and tree.u_max[0] == 4.0 and np.array_equal(tree.u_lo[1:], -tree.u_max[1:])
+    p, a = np.array([0.1, 0.2, 0.3]), np.array([0.6, 0.0, 0.8])
+    assert np.allclose(tree.actuation[:6, 0], [*a, *(np.cross(p, a) - 0.1 * a)], atol=1e-15)
+    assert np.array_equal(tree.actuation[6:, 1:], np.eye(tree.nv - 6)) and not tree.actuation[6:, 0].any()
+    motors = ElementTree.fromstring(robot_mjcf(tree)).findall("actuator/motor")
+    assert motors[0].get("site") == "jet" and motors[0].get("ctrlrange") == "0.5 4.0"
+    assert "static constexpr double u_lo[" in robot_header(tree)
+
+
+def test_a_robot_without_thrusters_has_the_digest_it_always_had():
+    assert load("panda").digest == 0x4B18E6738C35F0DC
+    assert "u_lo" not in robot_header(load("panda"))
+
+
+def test_feet_stand_on_their_frames(models):
+    """A box's lower face is the frame's x-y plane; a ball is centred on the frame."""
+    spoil(models, "[spheres]", "[feet]\ntip = [0.1, 0.06, 0.01]\nwheel_rim = 0.02\n\n[spheres]")
+    tree = build(read_spec("zoo", models))
+    geoms = {geom.get("name"): geom for geom in ElementTree.fromstring(robot_mjcf(tree)).iter("geom")}
+    assert geoms["tip"].get("type") == "box" and geoms["wheel_rim"].get("size") == "0.02"
+    f = tree.frame_name.index("tip")
+    up = np.array([float(x) for x in geoms["tip"].get("pos").split()]) - tree.p_JF[f]
+    assert np.allclose(tree.R_JF[f].T @ up, [0.0, 0.0, 0.01], atol=1e-15)
+    assert tree.digest == build(read_spec("zoo", ZOO.parent)).digest  # feet concern the plant alone
+
+
+@pytest.mark.parametrize("name", ["panda", "talos", "anymal", "hector"])
 def test_committed_files_are_what_the_command_writes(name):
     tree = load(name)
     assert (ROOT / "tables" / name / "robot.h").read_text(encoding="utf-8") == robot_header(tree)
@@ -197,6 +237,12 @@ WRONG = {
     "sphere of no size": ("0.0, 0.05]]", "0.0, 0.0]]", r"radius .* must be positive"),
     "sphere shape": ("0.0, 0.05]]", "0.05]]", r"tip_link: expected numbers of shape"),
     "frame that rests": ('wheel_rim = "rim_link"', 'wheel_rim = "universe"', r"frame 'universe' does not move"),
+    "foot on no frame": ("[spheres]", "[feet]\ntop = 0.1\n\n[spheres]", r"top: a foot stands on a named frame; did you mean"),
+    "flat foot": ("[spheres]", "[feet]\ntip = [0.1, 0.1, 0.0]\n\n[spheres]", r"tip: a foot is a ball .* or a box"),
+    "thruster without link": ("[spheres]", THRUSTER.replace('link = "base_link"', "") + "[spheres]", r"key 'link' is missing"),
+    "thruster on a limb": ("[spheres]", THRUSTER.replace("base_link", "tip_link") + "[spheres]", r"thruster 'jet' must sit on"),
+    "thrust upside down": ("[spheres]", THRUSTER.replace("u_hi = 4.0", "u_hi = 0.1") + "[spheres]", r"0\.5 N is not below"),
+    "thruster without axis": ("[spheres]", THRUSTER.replace("[0.6, 0.0, 0.8]", "[0, 0, 0]") + "[spheres]", r"must not be zero"),
     "posture by name": ("home = {", 'home = "stand"\n# {', r"a posture by name needs an SRDF"),
 }
 

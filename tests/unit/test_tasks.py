@@ -14,6 +14,7 @@ from engram.inputs import InputError
 from engram.paths import MODELS, ROOT
 from engram.robots.tree import q_to_pin
 from engram.tasks.emit_header import task_header
+from engram.tasks.motion import load_motion
 from engram.tasks.reach import ReachSampler, draw_pose, sample_target, task_vector
 from engram.tasks.scene import scene_mjcf
 from engram.tasks.spec import load_task
@@ -55,6 +56,51 @@ def test_committed_files_are_what_the_command_writes(spec):
     scene = scene_mjcf(spec, ROOT / "tables/panda/robot.xml", MODELS / "panda/reach/world.xml", folder)
     assert (folder / "task.h").read_text(encoding="utf-8") == task_header(spec)
     assert (folder / "scene.xml").read_text(encoding="utf-8") == scene
+
+
+@pytest.mark.parametrize("robot, task", [("talos", "stand"), ("anymal", "trot"), ("hector", "fly")])
+def test_committed_files_of_motions_are_what_the_command_writes(robot, task):
+    motion, folder = load_motion(robot, task), ROOT / "tables" / f"{robot}_{task}"
+    scene = scene_mjcf(motion, ROOT / f"tables/{robot}/robot.xml", MODELS / robot / task / "world.xml", folder)
+    assert (folder / "task.h").read_text(encoding="utf-8") == task_header(motion)
+    assert (folder / "scene.xml").read_text(encoding="utf-8") == scene
+
+
+def test_tables_of_a_motion_become_constants(tmp_path):
+    shutil.copytree(MODELS / "hector", tmp_path / "hector")
+    path = tmp_path / "hector" / "fly" / "task.toml"
+    before = load_motion("hector", "fly", tmp_path)
+    path.write_text(path.read_text(encoding="utf-8") + "\n[weights]\nposition = 2.0\nvelocity = [1.0, 0.5]\n", encoding="utf-8")
+    motion = load_motion("hector", "fly", tmp_path)
+    assert motion.digest != before.digest
+    text = task_header(motion)
+    assert "static constexpr double weights_position = 0x1p+1;  // 2\n" in text
+    assert "static constexpr double weights_velocity[2] = {0x1p+0, 0x1p-1};  // 1, 0.5\n" in text
+
+
+WRONG_MOTION = {
+    "number outside a table": ("[horizon]", "gain = 1.0\n\n[horizon]", r"gain: a motion's own numbers stand in tables"),
+    "word for a number": ("position = 0.05", 'position = "near"', r"task\.toml:\d+: position: expected numbers"),
+    "unknown kind": ('kind = "motion"', 'kind = "motoin"', r"kind: must be one of reach, motion"),
+    "no horizon": ("[horizon]", "[horizons]", r"key 'horizon' is missing"),
+}
+
+
+@pytest.mark.parametrize("old, new, message", WRONG_MOTION.values(), ids=WRONG_MOTION.keys())
+def test_wrong_motion_gives_one_message(tmp_path, capfd, old, new, message):
+    shutil.copytree(MODELS / "hector", tmp_path / "hector")
+    path = tmp_path / "hector" / "fly" / "task.toml"
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new, 1), encoding="utf-8")
+    assert main(["task", "hector", "fly", "--models", str(tmp_path), "--tables", str(tmp_path / "tables")]) == 2
+    error = capfd.readouterr().err
+    assert error.count("\n") == 1 and re.search(message, error), error
+
+
+def test_a_motion_is_not_sampled():
+    with pytest.raises(InputError, match="only reach tasks are sampled"):
+        load_task("talos", "stand")
 
 
 def test_boxes_are_those_of_the_world(spec):

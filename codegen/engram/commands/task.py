@@ -7,6 +7,7 @@ from engram.paths import BUILD, MODELS, TABLES, relative, write_changed
 
 EXAMPLES = """examples:
   engram task panda reach             constants of models/panda/reach/, and a scene with collision geoms only
+  engram task talos stand             of a motion: its own tables become constants
   engram task panda reach --meshes    also build/scene/panda_reach.xml, which shows the robot's meshes
 """
 
@@ -26,10 +27,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
 def run(args: argparse.Namespace) -> int:
     """Write task.h and scene.xml; with --meshes also the scene that shows the robot's meshes."""
     from engram.tasks.emit_header import task_header
+    from engram.tasks.motion import load_motion
     from engram.tasks.scene import scene_mjcf, write_shown_scene
-    from engram.tasks.spec import load_task
+    from engram.tasks.spec import load_task, open_task
 
-    spec = load_task(args.robot, args.task, args.models)
+    load = {"reach": load_task, "motion": load_motion}[open_task(args.robot, args.task, args.models).data["kind"]]
+    spec = load(args.robot, args.task, args.models)
     world = args.models / args.robot / args.task / "world.xml"
     folder = args.tables / f"{args.robot}_{args.task}"
     folder.mkdir(parents=True, exist_ok=True)

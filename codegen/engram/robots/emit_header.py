@@ -57,6 +57,7 @@ def robot_header(tree: Tree) -> str:
     coordinates = [
         n for i, n in enumerate(joints) for n in ([f"{n} {a}" for a in "x y z qx qy qz qw".split()] if tree.kind[i] == 0 else [n])
     ]
+    controls = [*tree.thruster_name, *dofs[6 if tree.kind[0] == 0 else 0 :]]
     guard = f"TABLES_{tree.name.upper()}_ROBOT_H_"
     upper = np.triu_indices(3)
     spheres = [f"{joints[j]}" for j in tree.sphere_joint]
@@ -100,7 +101,8 @@ def robot_header(tree: Tree) -> str:
         *numbers("q_lo", tree.q_lo, coordinates),
         *numbers("q_hi", tree.q_hi, coordinates),
         *numbers("v_max", tree.v_max, dofs),
-        *numbers("u_max", tree.u_max, dofs[tree.nv - tree.nu :]),
+        *numbers("u_max", tree.u_max, controls),
+        *(_thrusters(tree, controls, dofs) if tree.thruster_name else []),
         *numbers("q_home", tree.q_home, coordinates),
         *numbers("gravity", tree.gravity, ["x (m/s^2)", "y", "z"]),
         "",
@@ -122,3 +124,12 @@ def robot_header(tree: Tree) -> str:
         f"#endif  // {guard}",
     ]
     return "\n".join(lines) + "\n"
+
+
+def _thrusters(tree: Tree, controls: list[str], dofs: list[str]) -> list[str]:
+    """What replaces the defaults (controls from -u_max on, each driving one of the last nu dofs) if there are thrusters."""
+    return [
+        "  // least controls [N, N m]; tau = actuation u [-, m]",
+        *numbers("u_lo", tree.u_lo, controls),
+        *numbers("actuation", tree.actuation, dofs),
+    ]

@@ -1,7 +1,7 @@
 """tables/<robot>/robot.xml: the tree as MJCF for MuJoCo 2.2.2, as numbers that give the same dynamics to rounding.
 
 Compiler flags keep MuJoCo from touching the inertias; joints have neither damping nor friction; torque motors carry the limits.
-Collision geoms are the spheres of robot.toml: they collide with the world (contype 1, conaffinity 2), not with each other.
+Collision geoms are the spheres and feet of robot.toml: they touch the world (contype 1, conaffinity 2), not each other.
 """
 
 import xml.etree.ElementTree as ElementTree
@@ -9,11 +9,12 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pinocchio as pin
 
-from engram.robots.linear3 import principal_axes
+from engram.robots.linear3 import principal_axes, turn_to
 from engram.robots.tree import FREE, NO_LIMIT, PRISMATIC, Tree
 from engram.robots.visuals import Visual
 
 GROUP_VISUAL, GROUP_COLLISION = 2, 3  # mjvOption.geomgroup: shown, hidden
+COLLISION = {"group": str(GROUP_COLLISION), "rgba": "0.2 0.6 0.9 0.4", "contype": "2", "conaffinity": "1"}
 
 
 def words(values) -> str:
@@ -49,7 +50,10 @@ def robot_mjcf(tree: Tree, visuals: list[Visual] = (), mesh_folder: str = "") ->
         _add_visuals(bodies[i], visuals, i)
     actuator = ElementTree.SubElement(root, "actuator")
     moved = [i for i in range(tree.nj) if tree.kind[i] != FREE]
-    for i, u_max in zip(moved, tree.u_max):
+    for name, twist, lo, hi in zip(tree.thruster_name, tree.twist, tree.u_lo, tree.u_max):
+        gear = words([0, 0, 1, 0, 0, twist])
+        ElementTree.SubElement(actuator, "motor", name=name, site=name, gear=gear, ctrllimited="true", ctrlrange=words([lo, hi]))
+    for i, u_max in zip(moved, tree.u_max[len(tree.thruster_name) :]):
         name = tree.joint_name[i]
         ElementTree.SubElement(actuator, "motor", name=name, joint=name, ctrllimited="true", ctrlrange=words([-u_max, u_max]))
     keyframe = ElementTree.SubElement(root, "keyframe")
@@ -78,11 +82,23 @@ def _add_body(parent: ElementTree.Element, tree: Tree, i: int) -> ElementTree.El
     for f in np.flatnonzero(tree.frame_joint == i):
         place = {"pos": words(tree.p_JF[f]), "quat": quaternion(tree.R_JF[f])}
         ElementTree.SubElement(body, "site", name=tree.frame_name[f], group="4", size="0.005", **place)
+        if tree.frame_name[f] in tree.feet:
+            ElementTree.SubElement(body, "geom", name=tree.frame_name[f], **_foot(tree, f), **COLLISION)
+    for name, p_BT, axis in zip(tree.thruster_name, tree.p_BT, tree.axis_B) if tree.parent[i] < 0 else ():
+        ElementTree.SubElement(body, "site", name=name, group="4", size="0.02", pos=words(p_BT), quat=quaternion(turn_to(axis)))
     for s in np.flatnonzero(tree.sphere_joint == i):
         sphere = {"type": "sphere", "size": words(tree.sphere_radius[s]), "pos": words(tree.p_JS[s])}
-        look = {"group": str(GROUP_COLLISION), "rgba": "0.2 0.6 0.9 0.4", "contype": "2", "conaffinity": "1"}
-        ElementTree.SubElement(body, "geom", name=f"sphere_{s}", **sphere, **look)
+        ElementTree.SubElement(body, "geom", name=f"sphere_{s}", **sphere, **COLLISION)
     return body
+
+
+def _foot(tree: Tree, f: int) -> dict[str, str]:
+    """The geom of the foot at frame f: a ball about its origin, or a box that stands on its x-y plane."""
+    size = tree.feet[tree.frame_name[f]]
+    R, p = tree.R_JF[f], tree.p_JF[f]
+    if len(size) == 1:
+        return {"type": "sphere", "size": words(size), "pos": words(p)}
+    return {"type": "box", "size": words(size), "pos": words(p + size[2] * R[:, 2]), "quat": quaternion(R)}
 
 
 def _add_visuals(body: ElementTree.Element, visuals: list[Visual], joint: int) -> None:

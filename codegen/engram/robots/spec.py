@@ -7,9 +7,25 @@ import numpy as np
 
 from engram.inputs import InputError, TomlFile, closest
 from engram.paths import MODELS
+from engram.robots.linear3 import unit
 
-KEYS = ["example_robot_data", "urdf", "srdf", "free_base", "home", "armature", "gravity", "locked", "joint", "frames", "spheres"]
+SOURCE_KEYS = ["example_robot_data", "urdf", "srdf"]
+KEYS = [*SOURCE_KEYS, "free_base", "home", "armature", "gravity", "locked", "joint", "frames", "spheres", "feet", "thruster"]
 JOINT_KEYS = ["armature", "q_lo", "q_hi", "v_max", "u_max"]
+THRUSTER_KEYS = ["link", "position", "axis", "twist", "u_lo", "u_hi"]
+
+
+@dataclass(frozen=True)
+class Thruster:
+    """A propeller on the free base: a force u along its axis, and a torque twist * u about it (SI units)."""
+
+    name: str
+    link: str
+    position: np.ndarray  # (3) m, link axes
+    axis: np.ndarray  # (3) unit vector, link axes
+    twist: float  # N m per N
+    u_lo: float  # N
+    u_hi: float  # N
 
 
 @dataclass(frozen=True)
@@ -29,6 +45,8 @@ class RobotSpec:
     joint: dict[str, dict[str, float]]  # per joint: overrides of JOINT_KEYS
     frames: dict[str, str]  # name in code -> frame of the URDF
     spheres: dict[str, np.ndarray]  # link -> (n, 4): centre in link axes, radius
+    feet: dict[str, np.ndarray]  # frame -> radius of a ball about its origin (1), or half sizes of a box that stands on it (3)
+    thrusters: list[Thruster]
 
 
 def known_robots(models: Path = MODELS) -> list[str]:
@@ -61,6 +79,12 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
     for link, rows in spheres.items():
         if np.any(rows[:, 3] <= 0.0):
             raise file.error(link, "a sphere's radius (fourth number) must be positive")
+    feet = {frame: np.atleast_1d(size) for frame, size in data.get("feet", {}).items()}
+    for frame, size in feet.items():
+        if frame not in data["frames"]:
+            raise file.error(frame, f"a foot stands on a named frame; {closest(frame, list(data['frames']))}")
+        if len(file.numbers(frame, size, (-1,))) not in (1, 3) or np.any(size <= 0.0):
+            raise file.error(frame, "a foot is a ball (its radius) or a box (three half sizes), all positive, in m")
     urdf, srdf, package_dirs = _sources(file)
     return RobotSpec(
         name=name,
@@ -76,7 +100,23 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
         joint=data.get("joint", {}),
         frames=data["frames"],
         spheres=spheres,
+        feet=feet,
+        thrusters=[_thruster(file, name, table) for name, table in data.get("thruster", {}).items()],
     )
+
+
+def _thruster(file: TomlFile, name: str, table: dict) -> Thruster:
+    """One [thruster.<name>]."""
+    file.check_keys(table, THRUSTER_KEYS, required=THRUSTER_KEYS)
+    if not file.data["free_base"]:
+        raise file.error(name, "a thruster needs free_base = true")
+    axis = file.numbers("axis", table["axis"], (3,))
+    if np.linalg.norm(axis) < 1e-6:
+        raise file.error("axis", f"the axis of thruster '{name}' must not be zero")
+    twist, u_lo, u_hi = (float(file.numbers(key, table[key], ())) for key in ("twist", "u_lo", "u_hi"))
+    if u_lo >= u_hi:
+        raise file.error("u_lo", f"thruster '{name}': the least thrust {u_lo:g} N is not below the largest {u_hi:g} N")
+    return Thruster(name, table["link"], file.numbers("position", table["position"], (3,)), unit(axis), twist, u_lo, u_hi)
 
 
 def _sources(file: TomlFile) -> tuple[Path, Path | None, list[str]]:

@@ -42,7 +42,9 @@ class Tree:
     q_lo: np.ndarray
     q_hi: np.ndarray
     v_max: np.ndarray
-    u_max: np.ndarray  # (nu)
+    u_max: np.ndarray  # (nu) thrusters first, then joints
+    u_lo: np.ndarray  # (nu), or empty: -u_max
+    actuation: np.ndarray  # (nv, nu): tau = actuation u, or empty: u drives the last nu dofs
     q_home: np.ndarray
     gravity: np.ndarray
     frame_name: list[str]
@@ -52,6 +54,11 @@ class Tree:
     sphere_joint: np.ndarray
     p_JS: np.ndarray  # (nsphere, 3)
     sphere_radius: np.ndarray
+    feet: dict[str, np.ndarray]  # frame -> radius of a ball (1), or half sizes of a box that stands on the frame (3)
+    thruster_name: list[str]
+    p_BT: np.ndarray  # (nthruster, 3) m, base axes
+    axis_B: np.ndarray  # (nthruster, 3) unit vectors, base axes
+    twist: np.ndarray  # (nthruster) N m per N
     R_turn: np.ndarray  # (nj, 3, 3) joint axes -> Pinocchio's axes of the same body
     continuous: np.ndarray  # (nj) bool
     model: pin.Model  # locked joints removed, armature and gravity set
@@ -78,7 +85,7 @@ class Tree:
         sha = hashlib.sha256()
         for field in fields(self):
             value = getattr(self, field.name)
-            if field.name in ("R_turn", "continuous") or not isinstance(value, np.ndarray):
+            if field.name in ("R_turn", "continuous", "p_BT", "axis_B", "twist") or not isinstance(value, np.ndarray):
                 continue
             sha.update(struct.pack(f"<{value.size}d", *value.astype(float).ravel()))
         return int.from_bytes(sha.digest()[:8], "big")
@@ -116,6 +123,9 @@ def build(spec: RobotSpec) -> Tree:
         q_lo[iq[i]] = model.lowerPositionLimit[model.joints[i + 1].idx_q]
         q_hi[iq[i]] = model.upperPositionLimit[model.joints[i + 1].idx_q]
     frames = [_frame(spec, model, R_turn, name, link) for name, link in spec.frames.items()]
+    p_BT, axis_B = _thrusters(spec, model)
+    twist = np.array([t.twist for t in spec.thrusters])
+    joint_u_max = np.clip(model.effortLimit[6 if spec.free_base else 0 :], 0.0, NO_LIMIT)
     spheres = [(_frame(spec, model, R_turn, link, link), row) for link, rows in spec.spheres.items() for row in rows]
     tree = Tree(
         name=spec.name,
@@ -134,7 +144,9 @@ def build(spec: RobotSpec) -> Tree:
         q_lo=np.clip(q_lo, -NO_LIMIT, NO_LIMIT),
         q_hi=np.clip(q_hi, -NO_LIMIT, NO_LIMIT),
         v_max=np.clip(model.velocityLimit, 0.0, NO_LIMIT),
-        u_max=np.clip(model.effortLimit[6 if spec.free_base else 0 :], 0.0, NO_LIMIT),
+        u_max=np.concatenate([[t.u_hi for t in spec.thrusters], joint_u_max]),
+        u_lo=np.concatenate([[t.u_lo for t in spec.thrusters], -joint_u_max]) if spec.thrusters else np.zeros(0),
+        actuation=_actuation(p_BT, axis_B, twist, model.nv) if spec.thrusters else np.zeros((0, 0)),
         q_home=np.zeros(len(q_lo)),
         gravity=spec.gravity,
         frame_name=list(spec.frames),
@@ -144,6 +156,11 @@ def build(spec: RobotSpec) -> Tree:
         sphere_joint=np.array([joint for (joint, _, _), _ in spheres], int),
         p_JS=np.array([p + product(R, row[:3]) for (_, R, p), row in spheres]).reshape(-1, 3),
         sphere_radius=np.array([row[3] for _, row in spheres]),
+        feet=spec.feet,
+        thruster_name=[t.name for t in spec.thrusters],
+        p_BT=p_BT,
+        axis_B=axis_B,
+        twist=twist,
         R_turn=R_turn,
         continuous=continuous,
         model=model,
@@ -257,6 +274,27 @@ def _frame(spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link
     joint = frame.parentJoint - 1
     R_JP = R_turn[joint].T
     return joint, product(R_JP, frame.placement.rotation), product(R_JP, frame.placement.translation)
+
+
+def _thrusters(spec: RobotSpec, model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (n, 3) m and axes (n, 3) of the thrusters in base axes."""
+    p_BT, axis_B = np.zeros((len(spec.thrusters), 3)), np.zeros((len(spec.thrusters), 3))
+    for n, thruster in enumerate(spec.thrusters):
+        joint, R, p = _frame(spec, model, np.eye(3)[None].repeat(model.njoints - 1, 0), thruster.name, thruster.link)
+        if joint != 0:
+            raise spec.file.error(thruster.name, f"thruster '{thruster.name}' must sit on the base, not on '{thruster.link}'")
+        p_BT[n], axis_B[n] = p + product(R, thruster.position), product(R, thruster.axis)
+    return p_BT, axis_B
+
+
+def _actuation(p_BT: np.ndarray, axis_B: np.ndarray, twist: np.ndarray, nv: int) -> np.ndarray:
+    """tau = B u: a thruster is the base wrench [axis, p x axis + twist axis], a joint motor drives its own dof."""
+    n = len(twist)
+    B = np.zeros((nv, n + nv - 6))
+    B[:3, :n] = axis_B.T
+    B[3:6, :n] = (np.cross(p_BT, axis_B) + twist[:, None] * axis_B).T
+    B[6:, n:] = np.eye(nv - 6)
+    return B
 
 
 def _check(spec: RobotSpec, tree: Tree) -> None:

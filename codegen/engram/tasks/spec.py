@@ -1,4 +1,4 @@
-"""models/<robot>/<task>/task.toml, checked, with the boxes of its world.xml."""
+"""models/<robot>/<task>/task.toml of a reach task, checked, with the boxes of its world.xml."""
 
 import hashlib
 import struct
@@ -15,6 +15,7 @@ from engram.robots.spec import known_robots, read_spec
 from engram.robots.tree import Tree, build
 from engram.tasks.world import Boxes, read_boxes
 
+KINDS = ["reach", "motion"]  # this file; engram.tasks.motion
 MAX_BOXES = 8
 WEIGHTS = ["position", "rotation", "posture", "velocity", "torque", "collision", "joint_limit", "velocity_limit", "torque_limit"]
 TERMINAL = [name for name in WEIGHTS if not name.startswith("torque") and name != "velocity_limit"]
@@ -43,7 +44,7 @@ class Region:
 
 @dataclass(frozen=True)
 class TaskSpec:
-    """A checked task (SI units)."""
+    """A checked reach task (SI units)."""
 
     name: str
     robot: Tree
@@ -81,30 +82,32 @@ def known_tasks(robot: str, models: Path = MODELS) -> list[str]:
     return sorted(path.parent.name for path in (models / robot).glob("*/task.toml"))
 
 
-def load_task(robot: str, task: str, models: Path = MODELS) -> TaskSpec:
-    """Read and check models/<robot>/<task>/task.toml and world.xml. Raises InputError."""
+def open_task(robot: str, task: str, models: Path = MODELS) -> TomlFile:
+    """models/<robot>/<task>/task.toml with one of the known kinds. Raises InputError."""
     if robot not in known_robots(models):
         raise InputError(f"unknown robot '{robot}'; {closest(robot, known_robots(models))}")
     if task not in known_tasks(robot, models):
         known = closest(task, known_tasks(robot, models))
         raise InputError(f"unknown task '{task}' of robot '{robot}'; {known}; a new one needs models/{robot}/{task}/task.toml")
     file = TomlFile(models / robot / task / "task.toml")
+    if file.data.get("kind") not in KINDS:
+        raise file.error("kind", f"must be one of {', '.join(KINDS)}")
+    return file
+
+
+def load_task(robot: str, task: str, models: Path = MODELS) -> TaskSpec:
+    """Read and check task.toml and world.xml of a reach task. Raises InputError."""
+    file = open_task(robot, task, models)
     data = file.data
-    required = ["frame", "vector", "weights", *SECTIONS, "memory", "targets"]
+    if data["kind"] != "reach":
+        raise file.error("kind", f"'{data['kind']}': only reach tasks are sampled, solved and remembered")
+    required = ["kind", "frame", "vector", "weights", *SECTIONS, "memory", "targets"]
     file.check_keys(data, required, required)
-    sections = {key: _section(file, data[key], names) for key, names in SECTIONS.items()}
+    sections = {key: _section(file, data[key], names) for key, names in SECTIONS.items() if key != "horizon"}
     file.check_keys(data["weights"], ["running", "terminal"], ["running", "terminal"])
     tree = build(read_spec(robot, models))
     if data["frame"] not in tree.frame_name:
         raise file.error("frame", f"robot '{robot}' has no frame '{data['frame']}'; {closest(data['frame'], tree.frame_name)}")
-    for row in data["vector"]:
-        if len(row) != 4 or not row[2] < row[3]:
-            raise file.error("vector", f"expected [name, unit, lowest, highest] with lowest < highest, found {row}")
-    knots = sections["horizon"]["knots"]
-    if knots < 1 or knots != int(knots):
-        raise file.error("knots", "expected a positive whole number")
-    if sections["horizon"]["dt"] <= 0.0:
-        raise file.error("dt", "expected a positive time in s")
     boxes = read_boxes(file.path.parent / "world.xml")
     if len(boxes.name) > MAX_BOXES:
         raise InputError(f"{file.path.parent / 'world.xml'}: {len(boxes.name)} boxes, at most {MAX_BOXES}; merge some")
@@ -117,11 +120,7 @@ def load_task(robot: str, task: str, models: Path = MODELS) -> TaskSpec:
         name=task,
         robot=tree,
         frame=data["frame"],
-        vector_name=[row[0] for row in data["vector"]],
-        vector_unit=[row[1] for row in data["vector"]],
-        vector_range=file.numbers("vector", [row[2:] for row in data["vector"]], (-1, 2)),
-        knots=int(knots),
-        dt=sections["horizon"]["dt"],
+        **task_vector_and_horizon(file),
         running=_section(file, data["weights"]["running"], WEIGHTS),
         terminal=_section(file, data["weights"]["terminal"], TERMINAL),
         margins=sections["margins"],
@@ -132,6 +131,25 @@ def load_task(robot: str, task: str, models: Path = MODELS) -> TaskSpec:
         regions=regions,
         boxes=boxes,
     )
+
+
+def task_vector_and_horizon(file: TomlFile) -> dict[str, Any]:
+    """What tasks of all kinds have: vector_name, vector_unit, vector_range, knots, dt."""
+    rows, horizon = file.data["vector"], _section(file, file.data["horizon"], SECTIONS["horizon"])
+    for row in rows:
+        if len(row) != 4 or not row[2] < row[3]:
+            raise file.error("vector", f"expected [name, unit, lowest, highest] with lowest < highest, found {row}")
+    if horizon["knots"] < 1 or horizon["knots"] != int(horizon["knots"]):
+        raise file.error("knots", "expected a positive whole number")
+    if horizon["dt"] <= 0.0:
+        raise file.error("dt", "expected a positive time in s")
+    return {
+        "vector_name": [row[0] for row in rows],
+        "vector_unit": [row[1] for row in rows],
+        "vector_range": file.numbers("vector", [row[2:] for row in rows], (-1, 2)),
+        "knots": int(horizon["knots"]),
+        "dt": horizon["dt"],
+    }
 
 
 def _section(file: TomlFile, table: dict[str, Any], names: list[str]) -> dict[str, float]:
