@@ -8,4 +8,5 @@ NB_MODULE(_engine, engine) {
   engram::binding::bind_arm(engine);
   engram::binding::bind_reach(engine);
   engram::binding::bind_memory(engine);
+  engram::binding::bind_tensor_train(engine);
 }

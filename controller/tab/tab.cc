@@ -5,6 +5,7 @@
 #include "controller/tab/tab_logit.h"
 #include "controller/tab/tab_pca.h"
 #include "controller/tab/tab_rbf.h"
+#include "controller/tab/tab_tt.h"
 
 #include <cmath>
 #include <cstring>
@@ -27,10 +28,26 @@ struct Text {
   }
 };
 
+// A tensor train whose points and ranks are whole numbers within their bounds, and whose cores are all there.
+bool tt_sizes_fit(const TabTt& t) {
+  if (t.d != t.head.nin || t.head.nout != 1 || t.head.narray != 5 || t.head.array[2].count != 2 * static_cast<uint64_t>(t.d) + 1 ||
+      t.head.array[3].count != static_cast<uint64_t>(t.d) || (t.type != kTabFloat32 && t.type != kTabInt8))
+    return false;
+  const auto whole = [&t](int i, int most) { return t.shape[i] >= 1 && t.shape[i] <= most && t.shape[i] == std::floor(t.shape[i]); };
+  const float* rank = t.shape + t.d;
+  int64_t numbers = 0;
+  for (int k = 0; k < t.d; ++k) {
+    if (!whole(k, TAB_TT_MAX_N) || !whole(t.d + k, TAB_TT_MAX_R) || !whole(t.d + k + 1, TAB_TT_MAX_R)) return false;
+    numbers += int64_t(t.shape[k]) * int64_t(rank[k]) * tab_tt_width(int32_t(rank[k + 1]));
+  }
+  return rank[0] == 1 && rank[t.d] == 1 && static_cast<int64_t>(t.head.array[4].count) == tab_words(t.type, numbers);
+}
+
 // Do the array counts fit the kind's own sizes?
 bool sizes_fit(const TabHead& h) {
   const auto count = [&h](int i) { return i < h.narray ? static_cast<int64_t>(h.array[i].count) : -1; };
-  if (h.nin < 1 || h.nin > TAB_MAX_IN || h.nout < 1 || h.narray > TAB_ARRAYS || count(0) != h.nin || count(1) != h.nin) return false;
+  const int most_in = h.kind == kTabTt ? int{TAB_TT_MAX_D} : int{TAB_MAX_IN};
+  if (h.nin < 1 || h.nin > most_in || h.nout < 1 || h.narray > TAB_ARRAYS || count(0) != h.nin || count(1) != h.nin) return false;
   for (int i = 0; i < h.narray; ++i)
     if (!h.array[i].data) return false;
   switch (h.kind) {
@@ -57,6 +74,7 @@ bool sizes_fit(const TabHead& h) {
       const TabLogit& t = reinterpret_cast<const TabLogit&>(h);
       return t.d == h.nin && h.nout == 1 && count(2) == t.d;
     }
+    case kTabTt: return tt_sizes_fit(reinterpret_cast<const TabTt&>(h));
     default: return false;
   }
 }
@@ -128,6 +146,7 @@ const char* tab_kind_text(uint32_t kind) {
     case kTabPca: return "PCA";
     case kTabRbf: return "RBF";
     case kTabLogit: return "logit";
+    case kTabTt: return "tensor train";
   }
   return "unknown";
 }

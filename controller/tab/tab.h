@@ -24,7 +24,7 @@ enum {
 };
 #define TAB_FAR 1e15f /* scaled input of a padding sample: farther than any query, its square still finite */
 
-typedef enum TabKind { kTabKnn = 1, kTabGpr = 2, kTabPca = 3, kTabRbf = 4, kTabLogit = 5 } TabKind;
+typedef enum TabKind { kTabKnn = 1, kTabGpr = 2, kTabPca = 3, kTabRbf = 4, kTabLogit = 5, kTabTt = 10 } TabKind;
 
 typedef enum TabStatus {
   kTabOk = 0,

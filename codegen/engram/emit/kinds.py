@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from engram.emit.arrays import Array, array, blocks, pad, padded_rows, triangle
+from engram.emit.arrays import TYPES, Array, array, blocks, pad, padded_rows, triangle
 
 
 @dataclass(kw_only=True)
@@ -174,3 +174,45 @@ class Logit(Table):
 
     def own_arrays(self) -> list[Array]:
         return [array("weight", "(d) per unit of the input", self.weight)]
+
+
+@dataclass(kw_only=True)
+class Tt(Table):
+    """Tensor train. cores: d arrays (r_k-1, n_k, r_k) over uniform grids lo .. hi; stored as float32 or int8."""
+
+    cores: list[np.ndarray]
+    type: str = "float32"
+
+    def __post_init__(self) -> None:
+        self.kind, self.constant = "tt", "kTabTt"
+        ranks = [core.shape[0] for core in self.cores] + [self.cores[-1].shape[2]]
+        if ranks[0] != 1 or ranks[-1] != 1 or any(c.shape[2] != r for c, r in zip(self.cores, ranks[1:], strict=True)):
+            raise ValueError(f"tt: the ranks of the cores do not fit each other: {[core.shape for core in self.cores]}")
+
+    @property
+    def outputs(self) -> int:
+        return 1
+
+    def fields(self) -> dict[str, int | np.float32]:
+        return {"d": len(self.cores), "type": TYPES[self.type]}
+
+    def own_arrays(self) -> list[Array]:
+        points = [core.shape[1] for core in self.cores]
+        ranks = [1] + [core.shape[2] for core in self.cores]
+        scale = np.ones(len(self.cores))
+        if self.type == "int8":
+            scale = np.array([max(float(np.abs(core).max()), 1e-30) / 127 for core in self.cores], np.float32)
+        slices = [np.moveaxis(core, 1, 0) / s for core, s in zip(self.cores, scale, strict=True)]
+        slices = [s if s.shape[2] == 1 else np.pad(s, ((0, 0), (0, 0), (0, pad(s.shape[2]) - s.shape[2]))) for s in slices]
+        flat = np.concatenate([s.reshape(-1) for s in slices])
+        about = "cores 1 .. d, slices (n_k, r_k-1, r_k padded)"
+        if self.type == "int8":
+            codes = np.rint(flat).astype(np.int8)
+            core = Array("core", about, np.pad(codes, (0, -len(codes) % 4)).reshape(1, -1))
+        else:
+            core = array("core", about, flat)
+        return [
+            array("shape", "points n_1 .. n_d, then ranks r_0 .. r_d", np.array(points + ranks)),
+            array("scale", "(d) a core is scale times what is stored", scale),
+            core,
+        ]

@@ -1,0 +1,132 @@
+// Cores of a tensor train: where they lie, and rows and columns times their slices. Internal to controller/tab.
+#ifndef CONTROLLER_TAB_TAB_TT_CORE_H_
+#define CONTROLLER_TAB_TAB_TT_CORE_H_
+
+#include "controller/tab/tab_lanes.h"
+#include "controller/tab/tab_tt.h"
+
+#include <cmath>
+
+namespace engram {
+
+inline int32_t tt_n(const TabTt* tab, int32_t k) { return static_cast<int32_t>(tab->shape[k]); }
+inline int32_t tt_r(const TabTt* tab, int32_t k) { return static_cast<int32_t>(tab->shape[tab->d + k]); }
+
+// One core, k = 0 .. d - 1.
+struct TtCore {
+  int32_t type, n, rows, columns, width;
+  int64_t offset;  // of its first number
+  const void* data;
+
+  int64_t slice(int32_t i) const { return offset + static_cast<int64_t>(i) * rows * width; }
+  int64_t size() const { return static_cast<int64_t>(n) * rows * width; }
+};
+inline TtCore tt_core(const TabTt* tab, int32_t k, int64_t offset) {
+  const int32_t columns = tt_r(tab, k + 1);
+  return {tab->type, tt_n(tab, k), tt_r(tab, k), columns, tab_tt_width(columns), offset, tab->core};
+}
+
+// A point between grid points i and i + 1: x = point i + t steps; `inside` is false where x was moved to the border of the domain.
+struct TtPoint {
+  int32_t i;
+  float t;
+  double step;
+  bool inside;
+};
+inline TtPoint tt_point(const TabTt* tab, int32_t k, double x) {
+  const double lo = tab_lo(&tab->head)[k], hi = tab_hi(&tab->head)[k];
+  const int32_t n = tt_n(tab, k);
+  const double step = n > 1 ? (hi - lo) / (n - 1) : 0.0;
+  if (n < 2 || !(hi > lo)) return {0, 0.0f, 0.0, false};
+  const double at = std::fmin(std::fmax((x - lo) / step, 0.0), n - 1.0);
+  const int32_t i = at < n - 2.0 ? static_cast<int32_t>(at) : n - 2;
+  return {i, static_cast<float>(at - i), step, x >= lo && x <= hi};
+}
+
+// out_g[c ..] = sum_j row_g[j] M[j][c ..] for G rows and V vectors of columns; M (rows, width) begins at number `at`.
+template <int type, int G, int V>
+inline void tt_product(const float* const* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out) {
+  TabLanes sum[G][V] = {};
+  for (int32_t j = 0; j < rows; ++j) {
+    for (int v = 0; v < V; ++v) {
+      const TabLanes m = tab_load_as<type>(data, at + static_cast<int64_t>(j) * width + c + v * TAB_LANES);
+      for (int g = 0; g < G; ++g) sum[g][v] += m * row[g][j];
+    }
+  }
+  for (int g = 0; g < G; ++g)
+    for (int v = 0; v < V; ++v) tab_store(out[g] + c + v * TAB_LANES, sum[g][v]);
+}
+
+// out_g = row_g M for G rows, as many columns at a time as registers hold.
+template <int type, int G>
+inline void tt_rows_times(const float* const* row, int32_t rows, const void* data, int64_t at, int32_t width, float* const* out) {
+  constexpr int kWide = G == 1 ? 8 : 2;
+  int32_t c = 0;
+  for (; c + kWide * TAB_LANES <= width; c += kWide * TAB_LANES) tt_product<type, G, kWide>(row, rows, data, at, width, c, out);
+  if constexpr (G == 1) {
+    for (; c + 4 * TAB_LANES <= width; c += 4 * TAB_LANES) tt_product<type, G, 4>(row, rows, data, at, width, c, out);
+    for (; c + 2 * TAB_LANES <= width; c += 2 * TAB_LANES) tt_product<type, G, 2>(row, rows, data, at, width, c, out);
+  }
+  for (; c + TAB_LANES <= width; c += TAB_LANES) tt_product<type, G, 1>(row, rows, data, at, width, c, out);
+}
+
+template <int type> inline float tt_number(const void* data, int64_t at) {
+  if constexpr (type == kTabInt8) return static_cast<float>(static_cast<const int8_t*>(data)[at]);
+  else return static_cast<const float*>(data)[at];
+}
+
+// out (width) = row (rows) times slice i
+inline void tt_row_times_slice(const TtCore& core, int32_t i, const float* row, float* out) {
+  const auto times = [&](auto type) {
+    const int64_t at = core.slice(i);
+    if (core.width > 1) return tt_rows_times<type, 1>(&row, core.rows, core.data, at, core.width, &out);
+    float sum = 0;
+    for (int32_t j = 0; j < core.rows; ++j) sum += row[j] * tt_number<type>(core.data, at + j);
+    out[0] = sum;
+  };
+  if (core.type == kTabInt8) times(std::integral_constant<int, kTabInt8>());
+  else times(std::integral_constant<int, kTabFloat32>());
+}
+
+// out (rows), `stride` apart, = slice i times column (width)
+inline void tt_slice_times_column(const TtCore& core, int32_t i, const float* column, float* out, int32_t stride) {
+  const auto times = [&](auto type) {
+    int64_t at = core.slice(i);
+    for (int32_t j = 0; j < core.rows; ++j, at += core.width) {
+      if (core.width == 1) {
+        out[j * stride] = tt_number<type>(core.data, at) * column[0];
+        continue;
+      }
+      TabLanes sum{};
+      for (int32_t c = 0; c < core.width; c += TAB_LANES) sum += tab_load_as<type>(core.data, at + c) * tab_load(column + c);
+      out[j * stride] = tab_sum(sum);
+    }
+  };
+  if (core.type == kTabInt8) times(std::integral_constant<int, kTabInt8>());
+  else times(std::integral_constant<int, kTabFloat32>());
+}
+
+// Divides v by a power of two so that its largest entry lies in [1, 2); returns the exponent. 0 where v vanishes or is not finite.
+inline int32_t tt_rescale(float* v, int32_t n) {
+  TabLanes top{};
+  int32_t i = 0;
+  for (; i + TAB_LANES <= n; i += TAB_LANES) {
+    const TabLanes a = tab_load(v + i), size = a < 0.0f ? -a : a;
+    top = size > top ? size : top;
+  }
+  float largest = 0;
+  for (int l = 0; l < TAB_LANES; ++l) largest = top[l] > largest ? top[l] : largest;
+  for (; i < n; ++i) largest = std::fabs(v[i]) > largest ? std::fabs(v[i]) : largest;
+  uint32_t bits;
+  std::memcpy(&bits, &largest, sizeof bits);
+  const int32_t biased = static_cast<int32_t>(bits >> 23);
+  if (biased == 0 || biased >= 254) return 0;
+  const uint32_t inverse_bits = static_cast<uint32_t>(254 - biased) << 23;
+  float inverse;
+  std::memcpy(&inverse, &inverse_bits, sizeof inverse);
+  for (i = 0; i < n; ++i) v[i] *= inverse;
+  return biased - 127;
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_TAB_TAB_TT_CORE_H_
