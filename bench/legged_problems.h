@@ -150,6 +150,7 @@ template <class P, int N> class TalosWalk {
     p.wrench_mu = 0.7 * std::cos(0.25 * M_PI);  // four facets within the cone
     p.wrench_half[0] = 0.05;
     p.wrench_half[1] = 0.025;
+    p.wrench_x[0] = 1.0;
   }
   void touch_down(int k, int foot, const Vec3<double>& target) {
     h_.phase[k] = kImpact | (foot == 0 ? kLeftFoot : kRightFoot);
@@ -169,8 +170,10 @@ template <class P, int N> class TalosWalk {
   }
   void track_com(int k, const Vec3<double>& c) {
     if constexpr (!kThesis) {
-      h_.knot[k].com_w = kStep * 1e6;
-      for (int i = 0; i < 3; ++i) h_.knot[k].com_ref[i] = c[i];
+      for (int i = 0; i < 3; ++i) {
+        h_.knot[k].com_w[i] = kStep * 1e6;
+        h_.knot[k].com_ref[i] = c[i];
+      }
     } else {
       static_cast<void>(k);
       static_cast<void>(c);
@@ -230,8 +233,10 @@ template <int N> class AnymalTrot {
           target[j][2] += i < phase ? kHeight * i / phase : kHeight * (1 - (i - phase) / phase);
           place(k, pairs[pair][j], target[j], kStep * 1e6);
         }
-        h.knot[k].com_w = kStep * 1e6;
-        for (int j = 0; j < 3; ++j) h.knot[k].com_ref[j] = com[j] + (j == 0 ? 0.5 * stride * done : 0.0);
+        for (int j = 0; j < 3; ++j) {
+          h.knot[k].com_w[j] = kStep * 1e6;
+          h.knot[k].com_ref[j] = com[j] + (j == 0 ? 0.5 * stride * done : 0.0);
+        }
       }
       h.phase[k] = kImpact | swings;
       weigh_state(h.knot[k], 1e1, 1e1, 1e3, 1e3, 1e3);

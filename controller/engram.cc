@@ -76,7 +76,7 @@ const char* engram_candidate_text(engram_candidate c) {
 void engram_default_options(const engram_model* model, engram_options* options) {
   *options = engram_options{};
   options->memory = ENGRAM_MODE_MEMORY;
-  options->iterations = 4;
+  options->iterations = model->iterations;
   options->iterations_jump = 10;
   options->starts = 3;
   options->line_search = 8;

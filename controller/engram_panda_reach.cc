@@ -1,5 +1,6 @@
 // The Panda that reaches: robot, task and memory bound into one model.
 #include "controller/loop/loop_controller.h"
+#include "controller/loop/loop_planner.h"
 #include "controller/loop/loop_reach.h"
 #include "controller/loop/loop_reach_memory.h"
 #include "tables/panda_reach/tables.h"
@@ -12,4 +13,4 @@ constexpr engram::MemoryTables kTables = {&panda_reach_knn_v1, &panda_reach_gpr_
 using Model = engram::ReachModel<Task, engram::ReachMemory<Task, kTables>>;
 }  // namespace
 
-extern "C" constexpr engram_model engram_panda_reach = engram::loop_model<Model>("panda", "reach");
+extern "C" constexpr engram_model engram_panda_reach = engram::loop_model<Model, engram::Planner<Model>>("panda", "reach");

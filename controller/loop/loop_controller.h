@@ -1,16 +1,17 @@
-// One controller: fast side and planner of a model M, in one block, behind the door.
+// One controller: fast side and planner of a model M, in one block, behind the door. The planner is Planner<M> (loop_planner.h) or
+// RecedingPlanner<M> (loop_receding.h).
 #ifndef CONTROLLER_LOOP_LOOP_CONTROLLER_H_
 #define CONTROLLER_LOOP_LOOP_CONTROLLER_H_
 
 #include "controller/loop/loop_door.h"
-#include "controller/loop/loop_planner.h"
+#include "controller/loop/loop_fast.h"
 
 #include <new>
 #include <type_traits>
 
 namespace engram {
 
-template <class M> struct LoopController : engram_controller {
+template <class M, class PlannerOfM> struct LoopController : engram_controller {
   using P = typename M::P;
   static constexpr int N = M::N;
   static_assert(P::nx <= ENGRAM_NX_MAX && M::ntask <= ENGRAM_NTASK_MAX && N < ENGRAM_KNOTS_MAX, "bounds of engram.h");
@@ -18,18 +19,19 @@ template <class M> struct LoopController : engram_controller {
   LoopController(const engram_model* m, const engram_options& o)
       : engram_controller{m, o}, fast(options), planner(options, fast) {}
 
-  FastLoop<P, N> fast;
-  Planner<M> planner;
+  FastLoop<P, N, typename M::Hold> fast;
+  PlannerOfM planner;
 };
 
 // The model of M. `constexpr` where it is defined, so that it lies in read-only memory.
-template <class M> constexpr engram_model loop_model(const char* robot, const char* task) {
-  using C = LoopController<M>;
+template <class M, class PlannerOfM> constexpr engram_model loop_model(const char* robot, const char* task) {
+  using C = LoopController<M, PlannerOfM>;
   using P = typename M::P;
   static_assert(std::is_trivially_destructible_v<C>, "a controller is forgotten, never destroyed");
   return {
       {robot, task, M::R::digest, M::Task::digest, P::nq, P::nv, P::nu, M::ntask, M::N, 1e-6 * M::kStepUs, M::kTickUs},
       sizeof(C),
+      M::kIterations,
       M::Memory::tables_fit,
       M::Memory::table_digest,
       [](const engram_model* m, const engram_options& o, void* at) -> engram_controller* { return new (at) C(m, o); },

@@ -12,7 +12,8 @@ struct alignas(ENGRAM_ALIGN) engram_controller {
 
 struct engram_model {
   engram_description about;
-  size_t bytes;  // of the controller
+  size_t bytes;         // of the controller
+  int32_t iterations;   // FDDP iterations per period by default
   bool (*tables_fit)();
   uint64_t (*table_digest)();
   engram_controller* (*build)(const engram_model*, const engram_options&, void* at);

@@ -1,8 +1,8 @@
 // The fast side of the loop: torque from the newest plan at every state, and the ladder below it.
 //
 //   plan      u = u* - K (x (-) x*)              x*, u*, K of the plan at time t
-//   hold      u = ID(q, v, a),  a = -w^2 (q (-) q_h) - 2 w v      q_h: the posture at which holding began
-//   damping   u = g(q) - D v                     D = kDamping of the torque limit per rad/s
+//   hold      keeps the posture at which holding began     (loop_hold.h: what that is depends on the kind of robot)
+//   damping   takes out the motion
 //   off       u = 0
 //
 // Then the clamp to the torque limits and to the largest rate. Runs on its own thread; one Exchange brings the plan.
@@ -11,15 +11,13 @@
 
 #include "controller/engram.h"
 #include "controller/loop/loop_exchange.h"
+#include "controller/loop/loop_hold.h"
 #include "controller/loop/loop_plan.h"
-#include "controller/rbd/rbd_manifold.h"
-#include "controller/rbd/rbd_rnea.h"
 
 #include <algorithm>
 
 namespace engram {
 
-inline constexpr double kDamping = 0.1;       // s/rad, of the torque limit
 inline constexpr double kOverspeed = 1.5;     // of the velocity limit: damping takes over
 inline constexpr double kLargestEntry = 1e3;  // a measured coordinate or velocity beyond it (rad, m, per s) is no measurement
 
@@ -48,10 +46,24 @@ template <class P> struct StateWatch {
   }
 };
 
-template <class P, int N> class FastLoop {
+// The last measured state, carried along to utime by what the plan moves; at rest without a plan.
+template <class P, int N> void predict(const Plan<P, N>& plan, const StateWatch<P>& watch, int64_t utime, double* x) {
+  if (plan.n == 0) {
+    std::memcpy(x, watch.x, sizeof(double) * P::nq);
+    std::memset(x + P::nq, 0, sizeof(double) * P::nv);
+    return;
+  }
+  double planned[P::nx], then[P::nx], dx[P::Layout::nxp];
+  plan_state(plan, watch.utime, planned);
+  plan_state(plan, utime, then);
+  P::difference(planned, watch.x, dx);
+  P::integrate(then, dx, x);
+}
+
+template <class P, int N, class Hold> class FastLoop {
  public:
   using R = typename P::R;
-  static constexpr int nq = P::nq, nv = P::nv, nu = P::nu, first = nv - nu;
+  static constexpr int nq = P::nq, nv = P::nv, nu = P::nu, base = P::kFreeBase ? 6 : 0;
 
   explicit FastLoop(const engram_options& options) : options_(options) {}
 
@@ -73,7 +85,6 @@ template <class P, int N> class FastLoop {
  private:
   bool plan_law(int64_t utime, bool good, double* tau) const;
   bool hold_law(const double* v, double* tau);
-  bool damping_law(const double* v, double* tau) const;
   void limit(int64_t utime, double* tau);
 
   const engram_options& options_;
@@ -85,11 +96,11 @@ template <class P, int N> class FastLoop {
   StateWatch<P> watch_;
   bool commanded_ = false, holding_ = false, overspeed_ = false;
   int64_t utime_ = 0;  // us, of the last command
-  double q_hold_[nq] = {};
+  Hold hold_;
   double tau_[nu] = {};  // last command
 };
 
-template <class P, int N> bool FastLoop<P, N>::plan_law(int64_t utime, bool good, double* tau) const {
+template <class P, int N, class Hold> bool FastLoop<P, N, Hold>::plan_law(int64_t utime, bool good, double* tau) const {
   const Plan<P, N>& plan = exchange_.value();
   const int k = plan.knot_at(utime);
   std::memcpy(tau, plan.s.u[k], sizeof(double) * nu);
@@ -103,26 +114,14 @@ template <class P, int N> bool FastLoop<P, N>::plan_law(int64_t utime, bool good
   return all_finite(tau, nu);
 }
 
-template <class P, int N> bool FastLoop<P, N>::hold_law(const double* v, double* tau) {
-  if (!holding_) std::memcpy(q_hold_, watch_.x, sizeof(q_hold_));
+template <class P, int N, class Hold> bool FastLoop<P, N, Hold>::hold_law(const double* v, double* tau) {
+  if (!holding_) hold_.begin(options_.hold_rate, watch_.x);
   holding_ = true;
-  RbdData<R, double> d;
-  double a[nv], force[nv];
-  const double w = options_.hold_rate;
-  rbd_difference<R>(watch_.x, q_hold_, a);
-  for (int i = 0; i < nv; ++i) a[i] = w * w * a[i] - 2.0 * w * v[i];
-  rbd_rnea<R>(watch_.x, v, a, d, force);
-  std::memcpy(tau, force + first, sizeof(double) * nu);
+  hold_.hold(watch_.x, v, tau);
   return all_finite(tau, nu);
 }
 
-template <class P, int N> bool FastLoop<P, N>::damping_law(const double* v, double* tau) const {
-  gravity_torque<P>(watch_.x, tau);
-  for (int i = 0; i < nu; ++i) tau[i] -= kDamping * R::u_max[i] * v[first + i];
-  return all_finite(tau, nu);
-}
-
-template <class P, int N> void FastLoop<P, N>::limit(int64_t utime, double* tau) {
+template <class P, int N, class Hold> void FastLoop<P, N, Hold>::limit(int64_t utime, double* tau) {
   const double since = 1e-6 * static_cast<double>(std::min<int64_t>(utime - utime_, options_.state_gap_us));
   for (int i = 0; i < nu; ++i) {
     const double lo = P::u_lo(i), hi = P::u_hi(i), step = options_.torque_rate * hi * since;
@@ -131,7 +130,8 @@ template <class P, int N> void FastLoop<P, N>::limit(int64_t utime, double* tau)
   }
 }
 
-template <class P, int N> engram_status FastLoop<P, N>::command(int64_t utime, const double* q, const double* v, double* tau) {
+template <class P, int N, class Hold>
+engram_status FastLoop<P, N, Hold>::command(int64_t utime, const double* q, const double* v, double* tau) {
   if (commanded_ && utime < utime_) {
     std::memcpy(tau, tau_, sizeof(tau_));
     return ENGRAM_STALE_STATE;
@@ -147,7 +147,7 @@ template <class P, int N> engram_status FastLoop<P, N>::command(int64_t utime, c
     status = ENGRAM_STALE_PLAN;
   }
   double fastest = 0.0;  // relative to the limit
-  for (int i = first; good && i < nv; ++i) fastest = std::max(fastest, std::fabs(v[i]) / R::v_max[i]);
+  for (int i = base; good && i < nv; ++i) fastest = std::max(fastest, std::fabs(v[i]) / R::v_max[i]);
   if (good) overspeed_ = fastest > (overspeed_ ? 1.0 : kOverspeed);
   if (overspeed_) rung = ENGRAM_RUNG_DAMPING;
   if (!good) {
@@ -161,7 +161,7 @@ template <class P, int N> engram_status FastLoop<P, N>::command(int64_t utime, c
   if (rung != ENGRAM_RUNG_HOLD) holding_ = false;
   if (rung == ENGRAM_RUNG_PLAN && !plan_law(utime, good, tau)) rung = ENGRAM_RUNG_HOLD;
   if (rung == ENGRAM_RUNG_HOLD && !hold_law(v_used, tau)) rung = ENGRAM_RUNG_DAMPING;
-  if (rung == ENGRAM_RUNG_DAMPING && !damping_law(v_used, tau)) rung = ENGRAM_RUNG_OFF;
+  if (rung == ENGRAM_RUNG_DAMPING && !(hold_.damp(watch_.x, v_used, tau), all_finite(tau, nu))) rung = ENGRAM_RUNG_OFF;
   if (rung == ENGRAM_RUNG_OFF) std::memset(tau, 0, sizeof(tau_));
   else limit(utime, tau);
 

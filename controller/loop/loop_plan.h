@@ -95,18 +95,26 @@ template <class P> void come_to_rest(double dt, const double* x, double* u, doub
   P::integrate(x, dx, x_next);
 }
 
-// The plan on other knot times, of which the first state is x0. Beyond its end it comes to rest.
-template <class P, int N>
-void resample(const Plan<P, N>& plan, const int64_t (&utime)[N + 1], const double* x0, Seed<P, N>& seed) {
+// The plan on other knot times, of which the first state is x0. Beyond its end, extend(k, x, u, x_next) gives control and next state.
+template <class P, int N, class Extend>
+void resample(const Plan<P, N>& plan, const int64_t (&utime)[N + 1], const double* x0, Seed<P, N>& seed, Extend extend) {
   std::memcpy(seed.x[0], x0, sizeof(seed.x[0]));
   for (int k = 0; k < N; ++k) {
     if (utime[k + 1] <= plan.utime[plan.n]) {
       std::memcpy(seed.u[k], plan.s.u[plan.knot_at(utime[k])], sizeof(seed.u[k]));
       plan_state(plan, utime[k + 1], seed.x[k + 1]);
     } else {
-      come_to_rest<P>(1e-6 * static_cast<double>(utime[k + 1] - utime[k]), seed.x[k], seed.u[k], seed.x[k + 1]);
+      extend(k, seed.x[k], seed.u[k], seed.x[k + 1]);
     }
   }
+}
+
+// The same, where beyond its end the plan comes to rest.
+template <class P, int N>
+void resample(const Plan<P, N>& plan, const int64_t (&utime)[N + 1], const double* x0, Seed<P, N>& seed) {
+  resample(plan, utime, x0, seed, [&](int k, const double* x, double* u, double* x_next) {
+    come_to_rest<P>(1e-6 * static_cast<double>(utime[k + 1] - utime[k]), x, u, x_next);
+  });
 }
 
 // Stands still at the posture of x0 under gravity torque.

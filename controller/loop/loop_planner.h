@@ -12,135 +12,46 @@
 #ifndef CONTROLLER_LOOP_LOOP_PLANNER_H_
 #define CONTROLLER_LOOP_LOOP_PLANNER_H_
 
-#include "controller/loop/loop_fast.h"
+#include "controller/loop/loop_core.h"
 #include "controller/loop/loop_guesses.h"
-#include "controller/loop/loop_solve.h"
 
 namespace engram {
 
-// A plan is executed although its gaps (L1, rad and rad/s) are not quite closed: the next period closes them before they are reached,
-// if they are small, and smaller still in the near future.
-inline constexpr int kNearKnots = 10;
-inline constexpr double kLargestNearGap = 0.1;
-inline constexpr double kLargestGap = 0.5;
-// Largest speed in the near future, of the velocity limit; a robot that is faster already may brake.
-inline constexpr double kLargestSpeed = 1.0;
 inline constexpr double kAstray = 0.9;  // share of what counts as success, beyond which the plan under way misses its target
 inline constexpr int kRivals = 5;       // guesses that are tried in turn while the plan does not end at the target
 
-template <class M> class Planner {
+template <class M> class Planner : public PlannerCore<M, Planner<M>> {
  public:
-  using P = typename M::P;
-  static constexpr int N = M::N, nx = P::nx, nq = P::nq, nv = P::nv;
+  using Core = PlannerCore<M, Planner<M>>;
+  using typename Core::Fast, typename Core::P;
+  using Core::N, Core::nq, Core::nx;
 
-  Planner(const engram_options& options, FastLoop<P, N>& fast) : options_(options), fast_(fast), solve_(options) {}
+  Planner(const engram_options& options, Fast& fast) : Core(options, fast) {}
 
-  engram_status set_task(int64_t utime, int32_t jump, const double* value, int n);
   engram_status prepare(int64_t utime);
-  engram_status feedback(int64_t utime, const double* q, const double* v);
-
-  const engram_cycle& cycle() const { return finished_; }
-  const engram_jump& jump() const { return jump_; }
-  const Plan<P, N>& plan() const { return plan_; }
+  engram_status roll(int64_t utime);
 
  private:
-  // Where the trajectory in `solve_` stands.
-  enum class Trial {
-    kNone,       // nothing worth a further iteration
-    kReady,      // swept, waiting for the state
-    kPostponed,  // sound, but not yet fit to be executed
-  };
-  struct Task {
-    int64_t utime;
-    int32_t jump;
-    double value[M::ntask];
-    typename M::Target target;
-    bool known;  // within the range of the memory
-  };
+  using typename Core::Trial;
+  using Core::cycle_, Core::ending_, Core::has_task_, Core::jump_, Core::jumped_, Core::options_, Core::plan_, Core::plan_jump_,
+      Core::prepared_, Core::seq_, Core::solve_, Core::task_, Core::trial_, Core::watch_;
   // The best of several starts.
   struct Result {
     Seed<P, N> seed;
     double score, reg;
   };
 
-  void begin_period();
-  void take_task(int64_t utime);
-  void predict(int64_t utime, double* x) const;
   void collect(bool postponed, const Deadline& deadline);
   bool search(bool waiting, Deadline& deadline);
   double score(double nearest) const;
   double nearest_allowed() const;
   void record_start(const Candidate<P>& guess);
   void record_merit(int iteration);
-  engram_status judge(bool accepted);
-  engram_status finish(engram_status status, engram_rung rung, const Deadline& deadline);
-  void drop_plan();
 
-  const engram_options& options_;
-  FastLoop<P, N>& fast_;
-
-  bool has_task_ = false, task_pending_ = false;
-  Task task_, pending_;
-  bool jumped_ = false;     // the next problem is the first of a jump
-  int32_t plan_jump_ = 0;   // jump that `plan_` serves
   int64_t jump_utime_ = 0;  // us, first knot of the jump's first problem
-
-  StateWatch<P> watch_;
-  Plan<P, N> plan_;  // executed; n = 0: none
-  Solve<M> solve_;
-  Trial trial_ = Trial::kNone;
-  engram_status ending_ = ENGRAM_ITERATING;  // of the iterations before the feedback
   Guesses<M> guesses_;
   Result best_;
-
-  bool prepared_ = false;  // cycle_ belongs to the period under way
-  engram_cycle cycle_ = {}, finished_ = {};
-  engram_jump jump_ = {};
-  int64_t seq_ = 0;
 };
-
-template <class M> engram_status Planner<M>::set_task(int64_t utime, int32_t jump, const double* value, int n) {
-  if (n != M::ntask || !all_finite(value, n)) return ENGRAM_BAD_TASK;
-  Task task;
-  if (!M::target(value, task.target)) return ENGRAM_BAD_TASK;
-  task.utime = utime;
-  task.jump = jump;
-  task.known = M::known(value);
-  std::memcpy(task.value, value, sizeof(task.value));
-  pending_ = task;
-  task_pending_ = true;
-  return task.known ? ENGRAM_CONVERGED : ENGRAM_TASK_FAR;
-}
-
-template <class M> void Planner<M>::begin_period() {
-  cycle_ = engram_cycle{};
-  solve_.clear();
-  guesses_.clear();
-  ending_ = ENGRAM_ITERATING;
-}
-
-// The pending task becomes the task once its time has come.
-template <class M> void Planner<M>::take_task(int64_t utime) {
-  if (!task_pending_ || pending_.utime > utime) return;
-  jumped_ = jumped_ || !has_task_ || pending_.jump != task_.jump;
-  task_ = pending_;
-  has_task_ = true;
-  task_pending_ = false;
-}
-
-// The last measured state, carried along by what the plan moves until utime.
-template <class M> void Planner<M>::predict(int64_t utime, double* x) const {
-  if (plan_.n == 0) {
-    std::memcpy(x, watch_.x, sizeof(double) * nq);
-    std::memset(x + nq, 0, sizeof(double) * nv);
-    return;
-  }
-  double planned[nx], then[nx], dx[P::Layout::nxp];
-  plan_state(plan_, watch_.utime, planned);
-  plan_state(plan_, utime, then);
-  P::difference(planned, watch_.x, dx);
-  P::integrate(then, dx, x);
-}
 
 // The guesses for the posed problem, and their merits.
 template <class M> void Planner<M>::collect(bool postponed, const Deadline& deadline) {
@@ -232,15 +143,16 @@ template <class M> bool Planner<M>::search(bool waiting, Deadline& deadline) {
 
 template <class M> engram_status Planner<M>::prepare(int64_t utime) {
   Deadline deadline(options_);
-  begin_period();
+  this->begin_period();
+  guesses_.clear();
   prepared_ = true;
-  take_task(utime);
+  this->take_task(utime);
   const bool postponed = trial_ == Trial::kPostponed;
   trial_ = Trial::kNone;
   if (!has_task_ || !watch_.any) return ENGRAM_NO_TASK;
   if (jumped_) jump_utime_ = utime;
   const bool fresh = jumped_ || plan_.n == 0 || postponed;  // whole knots from utime on
-  predict(utime, solve_.horizon.x0);
+  predict(plan_, watch_, utime, solve_.horizon.x0);
   solve_.pose(task_.target, jump_utime_, utime, fresh ? utime : plan_.utime[1]);
   collect(postponed, deadline);
   if (search(fresh || plan_jump_ != task_.jump, deadline)) {
@@ -253,75 +165,16 @@ template <class M> engram_status Planner<M>::prepare(int64_t utime) {
 }
 
 // May the new plan be executed? The status says what stands against it.
-template <class M> engram_status Planner<M>::judge(bool accepted) {
+template <class M> engram_status Planner<M>::roll(int64_t utime) {
+  solve_.repose(task_.target, jump_utime_, utime);
+  const bool accepted = solve_.feedback();
   cycle_.cost = solve_.plan.s.cost;
   cycle_.gap = solve_.open_gap(0, N);
   if (!solve_.finite()) return ENGRAM_NOT_FINITE;
   cycle_.npath = N + 1;
   cycle_.clearance = solve_.look_along(cycle_.path);
   if (!(cycle_.clearance >= nearest_allowed())) return ENGRAM_COLLISION;
-  // gap 0 lies between the measured state and the first knot: the gains answer for it
-  if (!(solve_.open_gap(1, kNearKnots) <= kLargestNearGap && solve_.open_gap(1, N) <= kLargestGap)) return ENGRAM_OPEN_GAPS;
-  if (!(solve_.speed(1, kNearKnots) <= std::max(kLargestSpeed, solve_.speed(0, 0)))) return ENGRAM_TOO_FAST;
-  if (ending_ == ENGRAM_DEADLINE) return ENGRAM_DEADLINE;
-  if (!accepted) return ENGRAM_NO_DESCENT;
-  return solve_.stop() < kStop ? ENGRAM_CONVERGED : ENGRAM_ITERATING;
-}
-
-template <class M> void Planner<M>::drop_plan() {
-  plan_.n = 0;
-  fast_.slot().n = 0;
-  fast_.publish();
-}
-
-template <class M> engram_status Planner<M>::finish(engram_status status, engram_rung rung, const Deadline& deadline) {
-  cycle_.seq = ++seq_;
-  cycle_.jump = has_task_ ? task_.jump : 0;
-  cycle_.status = status;
-  cycle_.rung = std::max(rung, fast_.take_rung());
-  cycle_.iterations = solve_.stats.iterations;
-  cycle_.linearize_us = solve_.stats.us[kLinearize];
-  cycle_.backward_us = solve_.stats.us[kBackward];
-  cycle_.rollout_us = solve_.stats.us[kRollout];
-  cycle_.total_us += deadline.spent();
-  fast_.alive(cycle_.utime, status);
-  finished_ = cycle_;
-  return status;
-}
-
-template <class M> engram_status Planner<M>::feedback(int64_t utime, const double* q, const double* v) {
-  const Deadline deadline(options_);
-  if (!prepared_) begin_period();
-  prepared_ = false;
-  cycle_.utime = utime;
-  const bool before = watch_.any && utime < watch_.utime;
-  const int64_t blind = watch_.any ? utime - watch_.utime : 0;
-  const bool good = !before && watch_.take(utime, q, v);
-  const Trial trial = trial_;
-  trial_ = Trial::kNone;
-  if (before || blind > options_.state_gap_us) {  // the robot may be anywhere
-    drop_plan();
-    if (before) watch_.any = false;
-    return finish(ENGRAM_STALE_STATE, ENGRAM_RUNG_HOLD, deadline);
-  }
-  if (!has_task_) return finish(good ? ENGRAM_NO_TASK : ENGRAM_BAD_STATE, ENGRAM_RUNG_HOLD, deadline);
-
-  const bool has_plan = plan_.n > 0 && utime < plan_.utime[N];
-  const engram_rung fallback = has_plan ? ENGRAM_RUNG_SHIFTED : ENGRAM_RUNG_HOLD;
-  if (!has_plan && plan_.n > 0) drop_plan();
-  const int64_t slip = utime - solve_.plan.utime[0];
-  if (trial != Trial::kReady) return finish(ending_ == ENGRAM_ITERATING ? ENGRAM_DEADLINE : ending_, fallback, deadline);
-  if (slip > M::kTickUs / 2 || slip < -M::kTickUs / 2) return finish(ENGRAM_DEADLINE, fallback, deadline);
-
-  if (good) std::memcpy(solve_.horizon.x0, watch_.x, sizeof(solve_.horizon.x0));
-  const engram_status status = judge(solve_.feedback(task_.target, jump_utime_, utime));
-  if (status == ENGRAM_COLLISION || status == ENGRAM_OPEN_GAPS || status == ENGRAM_TOO_FAST) trial_ = Trial::kPostponed;
-  if (status == ENGRAM_NOT_FINITE || trial_ == Trial::kPostponed) return finish(status, fallback, deadline);
-  plan_ = solve_.plan;
-  plan_jump_ = task_.jump;
-  fast_.slot() = plan_;
-  fast_.publish();
-  return finish(good ? status : ENGRAM_BAD_STATE, ENGRAM_RUNG_PLAN, deadline);
+  return this->judge(accepted);
 }
 
 }  // namespace engram

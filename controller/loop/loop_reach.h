@@ -2,6 +2,7 @@
 #ifndef CONTROLLER_LOOP_LOOP_REACH_H_
 #define CONTROLLER_LOOP_LOOP_REACH_H_
 
+#include "controller/loop/loop_hold.h"
 #include "controller/loop/loop_merit.h"
 #include "controller/ocp/ocp_reach.h"
 
@@ -15,8 +16,10 @@ template <class Task_, class Memory_> struct ReachModel {
   using P = Reach<Task>;
   using Knot = typename P::template Knot<double>;
   using Target = ReachTarget;
+  using Hold = DrivenHold<P>;
   static constexpr int N = Task::nknots;
   static constexpr int ntask = Task::ntask;
+  static constexpr int kIterations = 4;  // per period
   static constexpr int64_t kStepUs = static_cast<int64_t>(1e6 * Task::dt + 0.5);
   static constexpr int64_t kTickUs = 10000;
   static_assert(kStepUs % kTickUs == 0, "a knot is a whole number of ticks");

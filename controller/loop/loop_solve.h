@@ -89,10 +89,13 @@ template <class M> class Solve {
     return status == FddpStatus::kIterationLimit;
   }
 
-  // The second half, for the state horizon.x0 measured at utime. True if the trajectory was improved.
-  bool feedback(const typename M::Target& target, int64_t jump_utime, int64_t utime) {
+  // The posed problem, but that it starts at utime.
+  void repose(const typename M::Target& target, int64_t jump_utime, int64_t utime) {
     plan.utime[0] = utime;
     pose_knot(target, jump_utime, 0);
+  }
+  // The second half, for the measured state horizon.x0. True if the trajectory was improved.
+  bool feedback() {
     const bool accepted = fddp_feedback(horizon, opts_, work_, plan.s, stats);
     step_ = accepted ? stats.last().step_length : 0.0;
     stop_ = stats.last().stop;

@@ -70,18 +70,24 @@ template <int contact> struct WrenchConeTerm {
     S wrench_w;        // weight [1/N^2, 1/(N m)^2]
     S wrench_mu;       // coefficient of friction of the pyramid
     S wrench_half[2];  // half length (x) and half width (y) of the sole [m]
+    S wrench_x[2];     // the sole's x axis in the world's (x, y): (cos, sin) of its yaw
   };
   template <class S> static S cost(const Param<S>& p, const S* l) { return cone_cost<6, WrenchConeTerm>(p, p.wrench_w, l); }
   template <class S> static S expand(const Param<S>& p, const S* l, S* g, S (&H)[6][6]) {
     return cone_expand<6, WrenchConeTerm>(p, p.wrench_w, l, g, H);
   }
+  // Rows are written in the sole's axes and turned by its yaw.
   template <class S, class F> static void visit(const Param<S>& p, F f) {
-    const S mu = p.wrench_mu, X = p.wrench_half[0], Y = p.wrench_half[1];
+    const S mu = p.wrench_mu, X = p.wrench_half[0], Y = p.wrench_half[1], c = p.wrench_x[0], s = p.wrench_x[1];
+    const auto turned = [&](const S (&a)[6]) {
+      const S row[6] = {c * a[0] - s * a[1], s * a[0] + c * a[1], a[2], c * a[3] - s * a[4], s * a[3] + c * a[4], a[5]};
+      f(row);
+    };
     for (int axis = 0; axis < 2; ++axis)
       for (double sign : {1.0, -1.0}) {
         S a[6] = {0.0, 0.0, -mu, 0.0, 0.0, 0.0};
         a[axis] = sign;
-        f(a);
+        turned(a);
       }
     const S normal[6] = {0.0, 0.0, -1.0, 0.0, 0.0, 0.0};
     f(normal);
@@ -89,13 +95,13 @@ template <int contact> struct WrenchConeTerm {
       for (double sign : {1.0, -1.0}) {
         S a[6] = {0.0, 0.0, axis == 0 ? -Y : -X, 0.0, 0.0, 0.0};
         a[3 + axis] = sign;
-        f(a);
+        turned(a);
       }
     for (double yaw : {-1.0, 1.0})
       for (double sx : {1.0, -1.0})
         for (double sy : {1.0, -1.0}) {
           const S a[6] = {sx * Y, sy * X, -mu * (X + Y), yaw * sx * mu, yaw * sy * mu, yaw};
-          f(a);
+          turned(a);
         }
   }
 };

@@ -53,13 +53,21 @@ template <class Reference> void refer(Reference& ref, int n) {  // 0.3 rad about
     for (int i = 0; i < 3; ++i) ref.p[c][i] = 0.1 * wave(i + 3 * c);
   }
 }
+void weigh_com(double (&w)[3], double size) {
+  for (int i = 0; i < 3; ++i) w[i] = size * (1 + i);
+}
+// A sole turned by 0.4 rad.
+template <class Cone> void turn(Cone& p) {
+  p.wrench_x[0] = std::cos(0.4);
+  p.wrench_x[1] = std::sin(0.4);
+}
 template <class P> typename P::template Knot<double> make_knot() {
   typename P::template Knot<double> k = {};
   k.dt = 0.04;
   weigh<P>(k);
   if constexpr (std::is_same_v<P, TalosUtils>) {
     k.control_w = 1e-3;
-    k.com_w = 50.0;
+    weigh_com(k.com_w, 50.0);
     static_cast<typename TalosFoot<0>::Param<double>&>(k).placement_w = 3.0;
     static_cast<typename TalosFoot<1>::Param<double>&>(k).placement_w = 2.0;
     for (auto* R : {static_cast<typename TalosFoot<0>::Param<double>&>(k).placement_R, static_cast<typename TalosFoot<1>::Param<double>&>(k).placement_R})
@@ -69,16 +77,18 @@ template <class P> typename P::template Knot<double> make_knot() {
       p.wrench_mu = 0.5;
       p.wrench_half[0] = 0.05;
       p.wrench_half[1] = 0.03;
+      turn(p);
     };
     cone(static_cast<WrenchConeTerm<0>::Param<double>&>(k));
     cone(static_cast<WrenchConeTerm<1>::Param<double>&>(k));
   } else if constexpr (std::is_same_v<P, StiffTalos>) {
-    k.com_w = 50.0;
+    weigh_com(k.com_w, 50.0);
     k.force_w = 1e-3;
     k.force_ref[2] = 300.0;
     k.wrench_w = 1e-3;
     k.wrench_mu = 0.5;
     k.wrench_half[0] = k.wrench_half[1] = 0.05;
+    turn(k);
     refer(k.contact_ref, 2);
   } else if constexpr (std::is_same_v<P, StiffAnymal>) {
     k.friction_w = 1e-2;
@@ -89,7 +99,7 @@ template <class P> typename P::template Knot<double> make_knot() {
   } else {
     k.control_w = 1e-3;
     k.limit_w_q = k.limit_w_v = 10.0;
-    k.com_w = 20.0;
+    weigh_com(k.com_w, 20.0);
     static_cast<typename AnymalFoot<2>::Param<double>&>(k).translation_w = 5.0;
     auto& p = static_cast<FrictionConeTerm<1>::Param<double>&>(k);
     p.friction_w = 1e-2;

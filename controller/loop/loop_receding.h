@@ -1,0 +1,119 @@
+// The planner of tasks that never end: a horizon that recedes, one trajectory, one iteration per tick by default.
+//
+//   prepare   predict the state at the next tick; pose the problem anew at the knots' times; shift the trajectory (knots sit at
+//             absolute times, so that only its first state is new, and a knot is appended at grid points); iterate; sweep once more
+//   feedback  roll out from the measured state; check the plan (finite, gaps, speeds); hand it to the fast side
+//
+// Whatever moves with time (references, contact phases) is the model's business. A model M of this planner has
+//
+//   using P, R, Target, Hold, Task (with its digest); static constexpr N, ntask, kStepUs, kTickUs
+//   static bool target(const double* value, Target&), known(const double* value)      as for the reach planner
+//   void begin(int64_t utime, const double* x)                        the robot starts here, with knots at utime + m kStepUs
+//   void take(int64_t utime, const Target&)                           from utime on this is the task
+//   void pose(const int64_t (&utime)[N + 1], const double* x0, Horizon<P, N>&)        all knots and phases for these knot times,
+//                                                                     x0: the state expected at utime[0]
+//   void extend(const Horizon<P, N>&, int k, const double* x, double* u, double* x_next)   a guess of knot k from state x on
+//   static void path(const double* x, double p[3])                    the point of the robot that is reported along the plan [m]
+//
+// It need not have contacts, nor phases.
+#ifndef CONTROLLER_LOOP_LOOP_RECEDING_H_
+#define CONTROLLER_LOOP_LOOP_RECEDING_H_
+
+#include "controller/loop/loop_core.h"
+
+namespace engram {
+
+template <class M> class RecedingPlanner : public PlannerCore<M, RecedingPlanner<M>> {
+ public:
+  using Core = PlannerCore<M, RecedingPlanner<M>>;
+  using typename Core::Fast, typename Core::P;
+  using Core::N, Core::nx;
+
+  RecedingPlanner(const engram_options& options, Fast& fast) : Core(options, fast) {}
+
+  engram_status prepare(int64_t utime);
+  engram_status roll(int64_t utime);
+
+ private:
+  using typename Core::Trial;
+  using Core::cycle_, Core::ending_, Core::has_task_, Core::jumped_, Core::options_, Core::plan_, Core::prepared_, Core::solve_,
+      Core::task_, Core::trial_, Core::watch_;
+
+  bool iterate(const Plan<P, N>& before, bool fresh, Deadline& deadline);
+
+  M model_;
+  int64_t origin_ = 0;  // us, whole knots end at origin_ + m kStepUs
+  int64_t taken_ = -1;  // us, time of the task that the model has
+  int64_t utime_[N + 1];
+  Seed<P, N> seed_;
+};
+
+// The trajectory before, on the new knot times, iterated and swept; a fresh one stands still. False if the solver failed.
+template <class M> bool RecedingPlanner<M>::iterate(const Plan<P, N>& before, bool fresh, Deadline& deadline) {
+  const double* const x0 = solve_.horizon.x0;
+  const auto extend = [&](int k, const double* x, double* u, double* x_next) { model_.extend(solve_.horizon, k, x, u, x_next); };
+  if (fresh) {
+    std::memcpy(seed_.x[0], x0, sizeof(seed_.x[0]));
+    for (int k = 0; k < N; ++k) extend(k, seed_.x[k], seed_.u[k], seed_.x[k + 1]);
+  } else {
+    resample(before, utime_, x0, seed_, extend);
+  }
+  std::memcpy(solve_.plan.utime, utime_, sizeof(utime_));
+  solve_.plan.n = N;
+  solve_.start(seed_.x, seed_.u, fresh ? 0.0 : solve_.reg());
+  const int iterations = fresh ? options_.iterations_jump : options_.iterations;
+  return solve_.improve(iterations - 1, deadline, [] {}) && solve_.ready();
+}
+
+template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
+  Deadline deadline(options_);
+  this->begin_period();
+  prepared_ = true;
+  this->take_task(utime);
+  const bool postponed = trial_ == Trial::kPostponed;
+  trial_ = Trial::kNone;
+  if (!has_task_ || !watch_.any) return ENGRAM_NO_TASK;
+  const bool fresh = plan_.n == 0 && !postponed;
+  predict(plan_, watch_, utime, solve_.horizon.x0);
+  if (fresh) {
+    origin_ = utime;
+    taken_ = -1;
+    model_.begin(utime, solve_.horizon.x0);
+  }
+  if (taken_ != task_.utime) {
+    taken_ = task_.utime;
+    model_.take(utime, task_.target);
+  }
+  const double posing = deadline.now();
+  knot_times<N>(utime, origin_, M::kStepUs, utime_);
+  solve_.horizon.n = N;
+  model_.pose(utime_, solve_.horizon.x0, solve_.horizon);
+  cycle_.query_us = deadline.now() - posing;
+  cycle_.nguess = 1;
+  cycle_.winner = cycle_.guess[0] = fresh ? ENGRAM_CANDIDATE_COLD : ENGRAM_CANDIDATE_SHIFTED;
+  if (iterate(postponed ? solve_.plan : plan_, fresh, deadline)) {
+    cycle_.merit[0] = solve_.merit();
+    trial_ = Trial::kReady;
+    if (deadline.late()) ending_ = ENGRAM_DEADLINE;
+  } else {
+    ending_ = solve_.failure();
+  }
+  jumped_ = false;
+  cycle_.total_us = deadline.spent();
+  return ending_;
+}
+
+template <class M> engram_status RecedingPlanner<M>::roll(int64_t utime) {
+  solve_.plan.utime[0] = utime;
+  solve_.horizon.knot[0].dt = solve_.plan.dt(0);
+  const bool accepted = solve_.feedback();
+  cycle_.cost = solve_.plan.s.cost;
+  cycle_.gap = solve_.open_gap(0, N);
+  if (!solve_.finite()) return ENGRAM_NOT_FINITE;
+  cycle_.npath = N + 1;
+  for (int k = 0; k <= N; ++k) M::path(solve_.plan.s.x[k], cycle_.path[k]);
+  return this->judge(accepted);
+}
+
+}  // namespace engram
+#endif  // CONTROLLER_LOOP_LOOP_RECEDING_H_
