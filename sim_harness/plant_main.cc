@@ -60,7 +60,7 @@ PlantOptions read_options(int argc, char** argv) {
        {"--clock", "lockstep|wall", "wait for each command (reproducible), or keep real time", &o.clock},
        {"--log", "FILE", "LCM event log of state, task, cycle and command", &o.log},
        {"--log-full", "S", "log every state of the first S seconds; default all (what engram replay can repeat)", &o.log_full},
-       {"--log-every", "N", "after that, log each N-th state and command; default 10", &o.log_every},
+       {"--log-every", "N", "after that, log each N-th state, its command and cycle; default 10", &o.log_every},
        {"--timing", "FILE", "CSV of the controller's CPU times", &o.timing},
        {"--results", "FILE", "JSON: how each jump ended, and counts", &o.results},
        {"--give-up", "S", "end if no command comes for this long (wall clock: no first one); default 10", &o.give_up},

@@ -45,7 +45,7 @@ std::string RunLog::read(const char* file, const std::vector<TimeRange>& ranges)
           m.npath <= 64) {
         auto& points = path[m.utime];
         points.resize(m.npath);
-        if (m.npath > 0) std::memcpy(points.data(), m.path, sizeof(double) * 3 * m.npath);
+        for (int k = 0; k < m.npath; ++k) std::copy_n(m.path[k], 3, points[k].begin());
       }
     }
     lcm_eventlog_free_event(event);

@@ -105,7 +105,9 @@ void Link::on_cycle(const lcm_recv_buf_t* buf, const char*, void* self) {
     return link.refuse(&link.refused_.malformed,
                        "ENGRAM_CYCLE is truncated or of another type; build both sides from one checkout");
   }
-  link.log_->add(cycle.utime, EventLog::kCycle, kCycleChannel, buf->data, static_cast<int>(buf->data_size));
+  if (cycle.jump != link.jump_ || link.log_->holds_state(cycle.utime))
+    link.log_->add(cycle.utime, EventLog::kCycle, kCycleChannel, buf->data, static_cast<int>(buf->data_size));
+  link.jump_ = cycle.jump;
 }
 
 void Link::on_timing(const lcm_recv_buf_t* buf, const char*, void* self) {

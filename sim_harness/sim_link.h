@@ -39,7 +39,7 @@ class Link {
   Link(const Link&) = delete;
   Link& operator=(const Link&) = delete;
 
-  // Opens LCM at `url`. `log` takes the accepted messages (none unless it is open); `timing` (CSV, may be null) takes timing_t.
+  // Opens LCM at `url`. `log` takes the accepted messages it keeps, of the cycles those of kept states and the first of every jump; `timing` (CSV, may be null) takes timing_t.
   std::string open(const char* url, uint64_t robot_digest, int nu, EventLog* log, std::FILE* timing);
 
   // Both encode into static buffers and publish; resend() publishes the same bytes again. A state with seq 1 begins an episode.
@@ -87,6 +87,7 @@ class Link {
   engram_msg_command_t command_{};
   Refused refused_;
   int64_t resends_ = 0;
+  int32_t jump_ = 0;  // of the last cycle
 };
 
 }  // namespace engram::sim

@@ -25,6 +25,10 @@ void EventLog::add(int64_t utime, Rank rank, const char* channel, const void* da
   if (log_) pending_.push_back({utime, rank, channel, std::string(static_cast<const char*>(data), size)});
 }
 
+bool EventLog::holds_state(int64_t utime) const {
+  return std::any_of(pending_.rbegin(), pending_.rend(), [=](const Event& e) { return e.rank == kState && e.utime == utime; });
+}
+
 void EventLog::flush(int64_t now) {
   if (pending_.size() > 256) write_before(now - kHoldBack);
 }

@@ -22,10 +22,13 @@ class EventLog {
   EventLog& operator=(const EventLog&) = delete;
   ~EventLog() { close(); }
 
-  // Empty string, or one line that says what is wrong. After `full` us only each `every`-th state and its command are kept.
+  // Empty string, or one line that says what is wrong. After `full` us only each `every`-th state and its command are
+  // wanted: keeps().
   std::string open(const char* path, int64_t full, int every);
   // Whether the log takes the state `seq` of time `utime`, and the command that answers it.
   bool keeps(int64_t utime, int64_t seq) const { return log_ && (utime < full_ || (seq - 1) % every_ == 0); }
+  // Whether it has lately taken the state of time `utime`.
+  bool holds_state(int64_t utime) const;
   void add(int64_t utime, Rank rank, const char* channel, const void* data, int size);
   void flush(int64_t now);  // writes what lies more than kHoldBack before `now`
   void close();             // writes the rest

@@ -1,5 +1,7 @@
 #include "controller/io/io_outbox.h"
 
+#include <type_traits>
+
 namespace engram::io {
 
 bool Outbox::command(const engram_msg_state_t& state, engram_status status, const double* tau) {
@@ -15,8 +17,8 @@ bool Outbox::command(const engram_msg_state_t& state, engram_status status, cons
 }
 
 bool Outbox::cycle(const engram_cycle& c) {
-  static_assert(sizeof(engram_msg_cycle_t::merit) == sizeof(engram_cycle::merit), "as many guesses in cycle_t as in engram.h");
-  static_assert(sizeof(engram_msg_cycle_t::path) == sizeof(engram_cycle::path), "as many knots in cycle_t as in engram.h");
+  static_assert(std::extent_v<decltype(engram_msg_cycle_t::merit)> == ENGRAM_GUESSES_MAX, "as many guesses in cycle_t as in engram.h");
+  static_assert(std::extent_v<decltype(engram_msg_cycle_t::path)> == ENGRAM_KNOTS_MAX, "as many knots in cycle_t as in engram.h");
   engram_msg_cycle_t m = {};
   m.utime = c.utime;
   m.seq = c.seq;
@@ -27,15 +29,16 @@ bool Outbox::cycle(const engram_cycle& c) {
   m.iterations = c.iterations;
   m.ncandidates = c.nguess;
   for (int i = 0; i < c.nguess; ++i) {
-    m.candidate[i] = c.guess[i];
-    m.merit[i] = c.merit[i];
+    m.candidate[i] = static_cast<int8_t>(c.guess[i]);
+    m.merit[i] = static_cast<float>(c.merit[i]);
   }
   m.cost = c.cost;
   m.gap = c.gap;
   m.clearance = c.clearance;
   m.trust = c.trust;
   m.npath = c.npath;
-  std::memcpy(m.path, c.path, sizeof(double[3]) * static_cast<size_t>(c.npath));
+  for (int k = 0; k < c.npath; ++k)
+    for (int i = 0; i < 3; ++i) m.path[k][i] = static_cast<float>(c.path[k][i]);
   return send(kCycleChannel, bytes_, encode(bytes_, sizeof bytes_, m));
 }
 

@@ -18,7 +18,7 @@ from engram_sim.pair import Pair, Progress, private_port, scene
 from engram_sim.results import MODES, Run, figures, read_run, read_runs
 from engram_sim.series import write_reach
 
-LOG_EVERY = 40  # plant steps between two states of the log: 25 a second, as many as the video shows
+LOG_EVERY = 40  # plant steps between two states (and cycles) of the log: 25 a second, as many as the video shows
 LOG_TRUNCATED = 3  # exit code of engram-plant: all done, but the disk was full
 SLOWEST_FIRST = ("cold", "shift", "line", "memory")  # so that no long run is left alone at the end
 

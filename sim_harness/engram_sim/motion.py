@@ -30,9 +30,14 @@ class Motion:
 
     def jump_cycles(self) -> np.ndarray:
         """The first cycle of each jump."""
-        jumps = self.cycles["jump"]
-        first = np.flatnonzero(np.diff(jumps, prepend=0) > 0)
-        return self.cycles[first]
+        return self.cycles[self._jumped()]
+
+    def later_cycles(self) -> np.ndarray:
+        """All others."""
+        return self.cycles[~self._jumped()]
+
+    def _jumped(self) -> np.ndarray:
+        return np.diff(self.cycles["jump"], prepend=0) > 0
 
     def error_over_time(self, times: np.ndarray) -> np.ndarray:
         """Distance of hand and target (m) at `times` (s) after each jump: (jumps, times); NaN after the jump has ended."""

@@ -123,11 +123,11 @@ def failures(runs: list[Run], limit: int = 40) -> str:
 
 
 def ladder(motions: list[Motion]) -> str:
-    """Share of cycles on each rung of the fall-back ladder."""
+    """Share of cycles on each rung of the fall-back ladder; a thinned log has too many that answer a jump: they are left out."""
     rungs = enumerators("engram_rung")
     rows = [["mode", *rungs]]
     for motion in motions:
-        rung = motion.cycles["rung"]
+        rung = motion.later_cycles()["rung"]
         if len(rung):
             rows.append([motion.run.mode, *(f"{100.0 * (rung == i).mean():.2f} %" for i in range(len(rungs)))])
     return html_table(rows, swatches=True) if len(rows) > 1 else ""
@@ -198,7 +198,7 @@ def write(
 <p>{MODES_TEXT}</p>
 {moving}{failures(runs)}
 <h2>Figures</h2><div class="grid">{figures}</div>
-<h2>Fall-back ladder</h2><p>Share of cycles by what drove the torque.</p>{ladder(motions)}
+<h2>Fall-back ladder</h2><p>Share of cycles, but those that answer a jump, by what drove the torque.</p>{ladder(motions)}
 <h2>Again</h2>
 <p><code>engram demo --robot {robot} --task {task} --seed {summary["seed"]} --jumps {summary["jumps"]}</code></p>
 <p><code>engram replay {html.escape(relative(runs[0].log))}</code></p>

@@ -70,14 +70,18 @@ def test_log_is_read_by_lcm(arena: Arena) -> None:
     assert ours == theirs and len(ours) > 1000
 
 
-def test_thinned_log_keeps_ticks_tasks_and_cycles(arena: Arena) -> None:
-    run_log(arena, "run.lcm", "--log-full", "0.1", "--log-every", "10")
+def test_thinned_log_keeps_each_nth_state_with_its_cycle_and_the_first_cycle_of_a_jump(arena: Arena) -> None:
+    run_log(arena, "run.lcm", "--log-full", "0.1", "--log-every", "20")
     log = eventlog.read(arena.folder / "run.lcm", list(eventlog.CHANNELS))
     states = log["ENGRAM_STATE"]
     later = states[states["utime"] >= 100_000]
-    assert np.all((later["seq"] - 1) % 10 == 0) and np.array_equal(states["seq"][:100], np.arange(1, 101))
+    assert np.all((later["seq"] - 1) % 20 == 0) and np.array_equal(states["seq"][:100], np.arange(1, 101))
     assert np.array_equal(log["ENGRAM_COMMAND"]["utime"], states["utime"])
-    assert len(log["ENGRAM_TASK"]) == 5 and np.isin(later["utime"], log["ENGRAM_CYCLE"]["utime"]).all()
+    cycles = log["ENGRAM_CYCLE"]
+    assert len(log["ENGRAM_TASK"]) == 5 and np.isin(later["utime"], cycles["utime"]).all()
+    extra = cycles[~np.isin(cycles["utime"], states["utime"])]
+    assert len(np.unique(cycles["jump"])) == 1 + JUMPS and len(extra) <= JUMPS
+    assert np.array_equal(np.unique(extra["jump"]), extra["jump"])
 
 
 def test_dead_controller_ends_the_run_with_one_message(arena: Arena) -> None:
