@@ -1,10 +1,13 @@
 #include "controller/tab/tab.h"
 
+#include "controller/tab/tab_gmr.h"
 #include "controller/tab/tab_gpr.h"
 #include "controller/tab/tab_knn.h"
 #include "controller/tab/tab_logit.h"
+#include "controller/tab/tab_mlp.h"
 #include "controller/tab/tab_pca.h"
 #include "controller/tab/tab_rbf.h"
+#include "controller/tab/tab_sdf.h"
 #include "controller/tab/tab_tt.h"
 
 #include <cmath>
@@ -75,6 +78,29 @@ bool sizes_fit(const TabHead& h) {
       return t.d == h.nin && h.nout == 1 && count(2) == t.d;
     }
     case kTabTt: return tt_sizes_fit(reinterpret_cast<const TabTt&>(h));
+    case kTabGmr: {
+      const TabGmr& t = reinterpret_cast<const TabGmr&>(h);
+      const int64_t k = t.k, m_pad = tab_pad(t.m);
+      return k > 0 && k <= TAB_GMR_MAX_K && t.d == h.nin && t.m == h.nout && t.m <= TAB_GMR_MAX_M && count(2) == tab_pad(t.k) &&
+             count(3) == tab_pad(t.k) && count(4) == k * tab_pad(t.d) && count(5) == k * t.d * tab_pad(t.d) && count(6) == k * m_pad &&
+             count(7) == tab_words(t.slope_type, k * t.d * m_pad) && count(8) == m_pad && count(9) == k * m_pad;
+    }
+    case kTabMlp: {
+      const TabMlp& t = reinterpret_cast<const TabMlp&>(h);
+      return t.d == h.nin && t.m == h.nout && t.depth > 0 && t.depth <= TAB_MLP_MAX_DEPTH && t.hidden > 0 && t.members > 0 &&
+             t.modes >= 0 && tab_pad(t.hidden) <= TAB_MLP_MAX_WIDTH && int64_t{t.modes} * (1 + 2 * int64_t{t.m}) <= TAB_MLP_MAX_WIDTH &&
+             t.m <= TAB_MLP_MAX_WIDTH && int64_t{t.members} * (t.modes + (t.modes == 0)) <= TAB_MLP_MAX_PARTS && count(2) == t.d &&
+             count(3) == t.d && count(4) == tab_words(t.weight_type, tab_mlp_weights(&t)) && count(5) == tab_mlp_biases(&t) &&
+             count(6) == tab_mlp_biases(&t);
+    }
+    case kTabSdf: {
+      const TabSdf& t = reinterpret_cast<const TabSdf&>(h);
+      const auto blocks = [](int32_t n) { return int64_t{n > 0 ? tab_pad(n) : TAB_LANES}; };
+      const bool grid = t.nx > 0;
+      return h.nin == 3 && h.nout == 1 && t.nbox >= 0 && t.nsphere >= 0 && count(2) == blocks(t.nbox) * TAB_SDF_BOX &&
+             count(3) == blocks(t.nsphere) * TAB_SDF_SPHERE && t.nx >= 0 && (!grid || (t.nx > 1 && t.ny > 1 && t.nz > 1 && t.spacing > 0)) &&
+             count(4) == (grid ? tab_words(t.grid_type, int64_t{tab_pad(t.nx)} * t.ny * t.nz) : int64_t{TAB_LANES});
+    }
     default: return false;
   }
 }
@@ -147,6 +173,9 @@ const char* tab_kind_text(uint32_t kind) {
     case kTabRbf: return "RBF";
     case kTabLogit: return "logit";
     case kTabTt: return "tensor train";
+    case kTabGmr: return "GMR";
+    case kTabMlp: return "MLP";
+    case kTabSdf: return "SDF";
   }
   return "unknown";
 }

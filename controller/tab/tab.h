@@ -18,13 +18,15 @@ extern "C" {
 enum {
   TAB_SCHEMA = 1,    /* layout of the structs below; a table of another schema is refused */
   TAB_LANES = 8,     /* floats in a vector: rows and blocks are padded to it */
-  TAB_ARRAYS = 8,    /* most arrays in one table */
+  TAB_ARRAYS = 12,   /* most arrays in one table */
   TAB_MAX_IN = 64,   /* most inputs of a table: bounds the evaluators' scratch */
   TAB_TEXT = 256,    /* bytes that hold any text of tab_check */
 };
 #define TAB_FAR 1e15f /* scaled input of a padding sample: farther than any query, its square still finite */
 
-typedef enum TabKind { kTabKnn = 1, kTabGpr = 2, kTabPca = 3, kTabRbf = 4, kTabLogit = 5, kTabTt = 10 } TabKind;
+typedef enum TabKind {
+  kTabKnn = 1, kTabGpr = 2, kTabPca = 3, kTabRbf = 4, kTabLogit = 5, kTabGmr = 6, kTabMlp = 7, kTabSdf = 8, kTabTt = 10
+} TabKind;
 
 typedef enum TabStatus {
   kTabOk = 0,

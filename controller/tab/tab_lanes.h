@@ -50,6 +50,16 @@ template <int type> inline TabLanes tab_load_as(const void* data, int64_t i) {
   else return tab_load_byte(static_cast<const int8_t*>(data) + i);
 }
 
+// One number of an array of a type.
+template <int type> inline float tab_at(const void* data, int64_t i) {
+  if constexpr (type == kTabFloat32) return static_cast<const float*>(data)[i];
+  else if constexpr (type == kTabInt8) return static_cast<const int8_t*>(data)[i];
+  else {
+    const uint16_t half[TAB_LANES] = {static_cast<const uint16_t*>(data)[i]};
+    return tab_load_half(half)[0];
+  }
+}
+
 // f(integral constant of the type): one instance of an inner loop for every type.
 template <class F> inline auto tab_with_type(int32_t type, F f) {
   switch (type) {

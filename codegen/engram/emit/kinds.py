@@ -10,6 +10,12 @@ import numpy as np
 from engram.emit.arrays import TYPES, Array, array, blocks, pad, padded_rows, triangle
 
 
+# TabKind of controller/tab/tab.h
+KINDS = {
+    "kTabKnn": 1, "kTabGpr": 2, "kTabPca": 3, "kTabRbf": 4, "kTabLogit": 5, "kTabGmr": 6, "kTabMlp": 7, "kTabSdf": 8, "kTabTt": 10,
+}  # fmt: skip
+
+
 @dataclass(kw_only=True)
 class Table(ABC):
     """What all kinds have in common (TabHead). `lo`, `hi`: domain; `inputs`: (name, unit) of each; `role`: what it is called."""
@@ -22,6 +28,11 @@ class Table(ABC):
     role: str = ""  # part of file and symbol names; the kind if empty
     kind: str = field(init=False, default="")  # "knn" for TabKnn
     constant: str = field(init=False, default="")  # its TabKind
+
+    @property
+    def number(self) -> int:
+        """Its TabKind as a number."""
+        return KINDS[self.constant]
 
     @property
     @abstractmethod
