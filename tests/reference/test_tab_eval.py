@@ -12,7 +12,8 @@ from sklearn.gaussian_process import GaussianProcessRegressor
 from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 from sklearn.neighbors import NearestNeighbors
 
-from engram.emit import Gpr, Knn, Logit, Pca, Rbf, write_tables
+from engram.emit import Gmr, Gpr, Knn, Logit, Mlp, Pca, Rbf, Sdf, Tt, write_tables
+from engram.emit.kinds import KINDS
 from engram.learn.timebase import basis
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -25,6 +26,20 @@ D, M, N = 5, 11, 203  # odd sizes, so that every padding is at work
 
 def inputs(n: int) -> list[tuple[str, str]]:
     return [(f"x{i}", "m") for i in range(n)]
+
+
+def small_tables(rng: np.random.Generator) -> list:
+    """The kinds whose evaluators tests/reference/test_tab_learners.py and test_tab_tt.py judge: here they only have to link."""
+    domain = dict(inputs=inputs(3), lo=-np.ones(3), hi=np.ones(3), held_out_error=0.0, held_out_text="")
+    net = [rng.normal(size=shape) for shape in ((3, 9), (9, 9), (9, 2))]
+    return [
+        Gmr(log_norm=np.zeros(2), freedom=np.zeros(2), mean_x=np.zeros((2, 3)), linv=np.tile(np.eye(3), (2, 1, 1)),
+            mean_y=np.ones((2, 4)), slope=rng.normal(size=(2, 4, 3)), var=np.ones((2, 4)), type="int8", **domain),
+        Mlp(center=np.zeros(3), width=np.ones(3), weights=[net], biases=[[np.zeros(w.shape[1]) for w in net]], type="float16",
+            **domain),
+        Sdf(boxes=[(np.zeros(3), np.eye(3), np.ones(3))], grid=rng.normal(size=(3, 3, 3)), type="int8", **domain),
+        Tt(cores=[rng.normal(size=shape) for shape in ((1, 4, 2), (2, 4, 2), (2, 4, 1))], type="int8", **domain),
+    ]  # fmt: skip
 
 
 class Tables:
@@ -55,6 +70,7 @@ class Tables:
                 **{**domain, "inputs": [("time", "s")], "lo": np.zeros(1), "hi": np.array([1.5])}),
             Logit(weight=self.weight, bias=self.bias,
                   **{**domain, "inputs": inputs(3), "lo": -np.ones(3), "hi": np.ones(3)}),
+            *small_tables(rng),
         ]  # fmt: skip
         self.folder = folder / "tables" / NAME
         self.manifest = write_tables(
@@ -217,7 +233,8 @@ def test_more_neighbours_than_samples(tables: Tables) -> None:
 
 def test_compiled_tables_pass_the_check(tables: Tables) -> None:
     text = ctypes.create_string_buffer(256)
-    for number, kind in enumerate(["knn", "gpr", "pca", "rbf", "logit"], 1):
+    for constant, number in KINDS.items():
+        kind = constant.removeprefix("kTab").lower()
         table = ctypes.byref(tables.table(kind))
         assert tables.lib.tab_check(table, number, ctypes.c_uint64(0xABC), ctypes.c_uint64(0xDEF), text) == OK, text.value
         entry = next(e for e in tables.manifest["tables"] if e["kind"] == kind)

@@ -73,6 +73,7 @@ def test_a_conditioned_mixture_is_the_joint_over_the_marginal(mixture: Mixture) 
     x, y = rng.uniform(-1, 1, (20, D)), rng.normal(size=(20, M))
     h, mean, _ = fitted.predict(x)
     for k, (weight, mu, scale, nu) in enumerate(zip(mixture.weight, mixture.mean, mixture.scale, mixture.freedom, strict=True)):
+
         def density(values: np.ndarray, mu: np.ndarray, scale: np.ndarray, nu: float = nu) -> np.ndarray:
             return multivariate_t.pdf(values, mu, scale, nu) if nu > 0 else multivariate_normal.pdf(values, mu, scale)
 
@@ -338,8 +339,8 @@ def test_not_finite_queries_are_answered_neutrally(all_tables, bad: float) -> No
 def test_odd_but_finite_queries_are_answered(all_tables) -> None:
     """Denormals, zeros of both signs, huge numbers, random bits: finite answers, and a word about the domain."""
     rng = np.random.default_rng(12)
-    bits = rng.integers(0, 2**32, 4000, dtype=np.uint32).view(np.float32).astype(float)
-    odd = np.r_[1e-320, -1e-320, 1e-40, -0.0, 1e30, -3e38, bits[np.isfinite(bits)]]
+    bits = rng.integers(0, 2**32, 4000, dtype=np.uint32).view(np.float32)
+    odd = np.r_[1e-320, -1e-320, 1e-40, -0.0, 1e30, -3e38, bits[np.isfinite(bits)].astype(float)]
     for table, d in all_tables:
         x = rng.choice(odd, (len(odd), d))
         answer = table.answers(x, 3)

@@ -9,10 +9,10 @@ import numpy as np
 
 from engram.emit.arrays import TYPES, Array, array, blocks, pad, padded_rows, triangle
 
-
 # TabKind of controller/tab/tab.h
 KINDS = {
-    "kTabKnn": 1, "kTabGpr": 2, "kTabPca": 3, "kTabRbf": 4, "kTabLogit": 5, "kTabGmr": 6, "kTabMlp": 7, "kTabSdf": 8, "kTabTt": 10,
+    "kTabKnn": 1, "kTabGpr": 2, "kTabPca": 3, "kTabRbf": 4, "kTabLogit": 5, "kTabGmr": 6, "kTabMlp": 7, "kTabSdf": 8,
+    "kTabTt": 10,
 }  # fmt: skip
 
 

@@ -136,6 +136,4 @@ def fit_density(
     scale, shift = np.ones(sizes[-1]), np.zeros(sizes[-1])
     scale[modes : modes * (1 + m)], shift[modes : modes * (1 + m)] = np.tile(y_std, modes), np.tile(y_mean, modes)
     shift[modes * (1 + m) :] = np.tile(np.log(y_std), modes)
-    return Network(
-        center, width, [[*weights[:-1], weights[-1] * scale]], [[*biases[:-1], biases[-1] * scale + shift]], modes
-    )
+    return Network(center, width, [[*weights[:-1], weights[-1] * scale]], [[*biases[:-1], biases[-1] * scale + shift]], modes)
