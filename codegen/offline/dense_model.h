@@ -37,7 +37,7 @@ template <class Layout, bool free_base> double dense_hessian(const KnotModel<Lay
   const int a = padded_index<Layout>(i), b = padded_index<Layout>(j);
   return m.Lzz[std::max(a, b)][std::min(a, b)];
 }
-template <class C> double dense_hessian(const ContactKnotModel<C>& m, int i, int j) {
+template <class C, int nt> double dense_hessian(const ContactKnotModel<C, nt>& m, int i, int j) {
   const int a = padded_index<LayoutOf<typename C::Robot>>(i), b = padded_index<LayoutOf<typename C::Robot>>(j);
   return m.hessian(std::max(a, b), std::min(a, b));
 }

@@ -119,6 +119,7 @@ template <class P, int N> void action_value(const typename FddpWork<P, N>::Model
     kernel::product_lower<nzp, nv, Sign::kPlus, ov, Start::kSet>(&m.D[0][0], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
     for (int i = ov; i < nzp; ++i) w.Q[i][i] += m.h[i];
     add_force_hessian<P, N>(m, w);
+    add_coupled_hessian<nzp>(m, w.Q);
   } else {
     for (int i = ov; i < nzp; ++i) std::memcpy(w.Q[i], m.Lzz[i], padded(i + 1) * sizeof(double));
     kernel::product_lower<nzp, nv, Sign::kPlus, ov>(&m.D[0][0], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
@@ -192,6 +193,7 @@ template <class P, int N>
 bool fddp_backward(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s) {
   w.dg = w.dq = 0.0;
   copy_hessian_x(w.model[h.n], w.Vxx);
+  if constexpr (P::kPhases) add_coupled_hessian<P::Layout::nxp>(w.model[h.n], w.Vxx);
   std::memcpy(w.Vx, w.model[h.n].Lz, sizeof(w.Vx));
   close_value(w);
   for (int k = h.n - 1; k >= 0; --k) {

@@ -1,4 +1,4 @@
-// What the costs of contact forces add to the sweep: their Hessian never becomes part of a knot's stored one.
+// What costs of contact forces and coupled residuals add to the sweep: their Hessian never becomes part of a knot's stored one.
 #ifndef CONTROLLER_FDDP_FDDP_FORCE_COSTS_H_
 #define CONTROLLER_FDDP_FDDP_FORCE_COSTS_H_
 
@@ -22,6 +22,12 @@ template <class P, int N> void add_force_hessian(const typename FddpWork<P, N>::
     kernel::product<rows, nzp, rows>(&m.H[c][0][0], 6, m.F[first], nzp, &w.W[0][0], nzp);
     kernel::product_lower<nzp, rows>(m.F[first], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
   });
+}
+
+// Q += T' T of coupled residuals: the first n rows and columns.
+template <int n, int ld, class Model> void add_coupled_hessian(const Model& m, double (*Q)[ld]) {
+  if constexpr (Model::nt > 0)
+    if (m.coupled) kernel::product_lower<n, Model::nt>(m.T[0], Model::L::nzp, m.T[0], Model::L::nzp, Q[0], ld);
 }
 
 }  // namespace engram

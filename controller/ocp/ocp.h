@@ -11,7 +11,7 @@
 #define CONTROLLER_OCP_OCP_H_
 
 #include "controller/ocp/ocp_actuation.h"
-#include "controller/ocp/ocp_view.h"
+#include "controller/ocp/ocp_residual.h"
 #include "controller/rbd/rbd_derivatives.h"
 #include "controller/rbd/rbd_forward.h"
 #include "controller/rbd/rbd_manifold.h"
@@ -67,6 +67,11 @@ template <class R_, class... Terms> struct Ocp {
     S u[nu], g[nv];
     rbd_kinematics<R>(x, d);
     for (int i = 0; i < nu; ++i) u[i] = 0.0;
+    if constexpr ((kNeedsMomentum<Terms> || ...)) {
+      rbd_velocity<R>(x + nq, d);
+      rbd_inertias<R>(d);
+      rbd_composite_inertias<R>(d);
+    }
     if constexpr (kNeedsGravity) {
       rbd_inertias<R>(d);
       rbd_gravity<R>(d, g);

@@ -4,7 +4,8 @@
 //   an impact:    v' = v + jump,  q' = q           no control, no time; its phase has the bit kImpact
 //
 // The phase of a knot (a mask of active contacts, plus kImpact) is part of the horizon: changing it changes no size. Terms are those
-// of ocp.h, and force terms (ocp_contact_force.h), which see contact forces (impulses at an impact).
+// of ocp.h, force terms (ocp_contact_force.h), which see the force of one contact (the impulse at an impact), and terms of all contacts
+// (ocp_zmp.h). Terms that couple more than q with q, or forces of several contacts, leave rows (CoupledRow) instead of a Hessian.
 #ifndef CONTROLLER_OCP_OCP_CONTACT_H_
 #define CONTROLLER_OCP_OCP_CONTACT_H_
 
@@ -21,6 +22,8 @@ inline constexpr unsigned kImpact = 1u << 31;
 
 template <class Term, class = void> inline constexpr bool kIsForceTerm = false;
 template <class Term> inline constexpr bool kIsForceTerm<Term, std::void_t<decltype(Term::kContact)>> = true;
+template <class Term, class = void> inline constexpr bool kIsTermOfContacts = false;
+template <class Term> inline constexpr bool kIsTermOfContacts<Term, std::void_t<decltype(Term::kOfContacts)>> = true;
 
 // References of the contacts, if the set asks for them by kp > 0.
 template <class C, class S, bool = (C::kp > 0.0)> struct ContactParam {
@@ -35,8 +38,9 @@ template <class C, class... Terms> struct ContactOcp {
   using R = typename C::Robot;
   using Contacts = C;
   using Layout = LayoutOf<R>;
-  using LqModel = ContactKnotModel<C>;
-  template <class S> using LanesOf = ContactLanes<C, S>;
+  static constexpr int nt = (kCoupledRows<Terms> + ... + 0);  // rows of coupled residuals
+  using LqModel = ContactKnotModel<C, nt>;
+  template <class S> using LanesOf = ContactLanes<C, nt, S>;
   using Lanes = LanesOf<Pack>;
   static constexpr bool kPhases = true, kFreeBase = has_free_base<R>();
   static constexpr int nq = R::nq, nv = R::nv, nx = nq + nv, ndx = 2 * nv, nu = R::nu, nz = ndx + nu, nf = kContactRows<C>;
@@ -67,20 +71,18 @@ template <class C, class... Terms> struct ContactOcp {
     ContactData<C, S> cd;
     S a[nv];
     dynamics(phase, knot, x, u, d, cd, a);
-    cost = sum_of_costs(knot, {x, x + nq, u, d, nullptr, nullptr}, cd.lambda);
+    cost = sum_of_costs(knot, {x, x + nq, u, d, nullptr, nullptr}, phase & ~kImpact, cd);
     step(phase, knot.dt, x, a, x_next);
   }
 
   // Cost of the terminal knot: kinematics only, no control, no forces.
   template <class S> static void calc_terminal(const Knot<S>& knot, const S* x, S& cost) {
     RbdData<R, S> d;
-    S u[nu], lambda[nf];
-    rbd_kinematics<R>(x, d);
-    rbd_velocity(x + nq, d);
-    rbd_subtree_moments(d);
+    ContactData<C, S> cd;
+    S u[nu];
+    terminal_kinematics(x, d, cd);
     for (S& s : u) s = 0.0;
-    for (S& s : lambda) s = 0.0;
-    cost = sum_of_costs(knot, {x, x + nq, u, d, nullptr, nullptr}, lambda);
+    cost = sum_of_costs(knot, {x, x + nq, u, d, nullptr, nullptr}, 0, cd);
   }
 
   // Next state, cost and the lanes' share of the linear-quadratic model of knots of one phase.
@@ -93,8 +95,7 @@ template <class C, class... Terms> struct ContactOcp {
     dynamics(phase, knot, x, u, w.d, w.cd, a);
     step(phase, knot.dt, x, a, x_next);
     const KnotView<R, S> view{x, x + nq, u, w.d, nullptr, nullptr};
-    cost = 0.0;
-    ((cost += expand<Terms>(knot, view, w)), ...);
+    cost = expand_terms(knot, view, active, w);
     if (phase & kImpact) {
       rbd_impulse_derivatives(x, x + nq, a, active, w.d, w.cd, w.x);
     } else {
@@ -128,14 +129,22 @@ template <class C, class... Terms> struct ContactOcp {
  private:
   template <class S>
   static void linearize_terminal(const Knot<S>& knot, const S* x, const S* u, S* x_next, S& cost, LanesOf<S>& w) {
-    rbd_kinematics(x, w.d);
-    rbd_velocity(x + nq, w.d);
-    rbd_subtree_moments(w.d);
-    for (S& l : w.cd.lambda) l = 0.0;
-    const KnotView<R, S> view{x, x + nq, u, w.d, nullptr, nullptr};
-    cost = 0.0;
-    ((cost += expand<Terms>(knot, view, w)), ...);
+    terminal_kinematics(x, w.d, w.cd);
+    cost = expand_terms(knot, {x, x + nq, u, w.d, nullptr, nullptr}, 0, w);
     for (int i = 0; i < nx; ++i) x_next[i] = x[i];
+  }
+
+  // What the terms see at the terminal knot: kinematics, no forces.
+  template <class S> static void terminal_kinematics(const S* x, RbdData<R, S>& d, ContactData<C, S>& cd) {
+    rbd_kinematics(x, d);
+    rbd_velocity(x + nq, d);
+    if constexpr ((kNeedsMomentum<Terms> || ...)) {
+      rbd_inertias(d);
+      rbd_composite_inertias(d);
+    } else {
+      rbd_subtree_moments(d);
+    }
+    for (S& l : cd.lambda) l = 0.0;
   }
 
   // Accelerations a (nv), or the jump of the velocity at an impact; contact forces or impulses in cd.lambda.
@@ -160,24 +169,47 @@ template <class C, class... Terms> struct ContactOcp {
     rbd_integrate<R>(x, dq, x_next);
   }
 
-  template <class S> static S sum_of_costs(const Knot<S>& knot, const KnotView<R, S>& view, const S* lambda) {
-    S cost = 0.0;
-    ((cost += cost_of<Terms>(knot, view, lambda)), ...);
+  template <class S> static S sum_of_costs(const Knot<S>& knot, const KnotView<R, S>& view, unsigned active, const ContactData<C, S>& cd) {
+    S lambda[nf], cost = 0.0;
+    rbd_contact_forces_seen(active, cd, lambda);
+    ((cost += cost_of<Terms>(knot, view, active, cd, lambda)), ...);
     return cost;
   }
-  template <class Term, class S> static S cost_of(const Knot<S>& knot, const KnotView<R, S>& view, const S* lambda) {
+  template <class Term, class S>
+  static S cost_of(const Knot<S>& knot, const KnotView<R, S>& view, unsigned active, const ContactData<C, S>& cd, const S* lambda) {
     const typename Term::template Param<S>& p = knot;
     if constexpr (kIsForceTerm<Term>) return Term::cost(p, lambda + kContactTree<C>.first[Term::kContact]);
+    else if constexpr (kIsTermOfContacts<Term>) return Term::cost(p, active, cd);
     else return Term::cost(p, view);
   }
-  template <class Term, class S> static S expand(const Knot<S>& knot, const KnotView<R, S>& view, LanesOf<S>& w) {
+
+  // Adds the terms' models to w; returns their costs.
+  template <class S> static S expand_terms(const Knot<S>& knot, const KnotView<R, S>& view, unsigned active, LanesOf<S>& w) {
+    S lambda[nf], cost = 0.0;
+    rbd_contact_forces_seen(active, w.cd, lambda);
+    ((cost += expand<Terms>(knot, view, active, lambda, w)), ...);
+    return cost;
+  }
+  template <class Term, class S>
+  static S expand(const Knot<S>& knot, const KnotView<R, S>& view, unsigned active, const S* lambda, LanesOf<S>& w) {
     const typename Term::template Param<S>& p = knot;
     if constexpr (kIsForceTerm<Term>) {
       constexpr int first = kContactTree<C>.first[Term::kContact];
-      return Term::expand(p, w.cd.lambda + first, w.g + first, w.H[Term::kContact]);
+      return Term::expand(p, lambda + first, w.g + first, w.H[Term::kContact]);
+    } else if constexpr (kIsTermOfContacts<Term>) {
+      return Term::expand_rows(p, active, w.cd, w.row + first_row<Term>());
+    } else if constexpr (kCoupledRows<Term> > 0) {
+      return Term::template expand_rows<nf>(p, view, w.row + first_row<Term>());
     } else {
       return Term::expand(p, view, w.cost);
     }
+  }
+  // Where the rows of a term begin.
+  template <class Term> static constexpr int first_row() {
+    int row = 0;
+    bool found = false;
+    ((found = found || std::is_same_v<Term, Terms>, row += found ? 0 : kCoupledRows<Terms>), ...);
+    return row;
   }
 
   // Zero where terms add: gradient, lower block qq and diagonal.

@@ -1,4 +1,4 @@
-// Terms on the force of a contact (world axes, at the origin of the contact's frame; ground flat, z its normal).
+// Terms on the force of a contact, in the axes of the set (kContactAxes); cones open along z of these.
 //
 // A force term says which contact of the set it weighs (kContact), gives its cost, and adds gradient g (rows) and Gauss-Newton
 // Hessian H (rows x rows) with respect to that force. The weight of an inactive contact must be 0 or its term vanish at force 0.
@@ -103,6 +103,28 @@ template <int contact> struct WrenchConeTerm {
           const S a[6] = {sx * Y, sy * X, -mu * (X + Y), yaw * sx * mu, yaw * sy * mu, yaw};
           turned(a);
         }
+  }
+};
+
+// Centre of pressure within a rectangular sole: |n_x| <= Y f_z, |n_y| <= X f_z.
+template <int contact> struct CopTerm {
+  static constexpr int kContact = contact;
+  static constexpr bool kNeedsGravity = false;
+  template <class S> struct Param {
+    S cop_w;        // weight [1/(N m)^2]
+    S cop_half[2];  // half length X and half width Y of the sole [m]
+  };
+  template <class S> static S cost(const Param<S>& p, const S* l) { return cone_cost<6, CopTerm>(p, p.cop_w, l); }
+  template <class S> static S expand(const Param<S>& p, const S* l, S* g, S (&H)[6][6]) {
+    return cone_expand<6, CopTerm>(p, p.cop_w, l, g, H);
+  }
+  template <class S, class F> static void visit(const Param<S>& p, F f) {
+    for (int axis = 0; axis < 2; ++axis)
+      for (double sign : {1.0, -1.0}) {
+        S a[6] = {0.0, 0.0, -p.cop_half[1 - axis], 0.0, 0.0, 0.0};
+        a[3 + axis] = sign;
+        f(a);
+      }
   }
 };
 

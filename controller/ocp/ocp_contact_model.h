@@ -2,15 +2,16 @@
 //
 //   dv' = D dz,  dq' = E dq + dt G dv'                 as in ocp_knot_model.h
 //   dlambda = F dz                                     contact forces, world axes at each contact
-//   l ~ l0 + Lz' dz + 1/2 dz' (Hqq + diag(h) + F' H F) dz
+//   l ~ l0 + Lz' dz + 1/2 dz' (Hqq + diag(h) + F' H F + T' T) dz
 //
-// Costs touch few coordinates: those of the state couple q with q, those of forces come through F. The full Hessian is never stored.
+// Costs touch few coordinates: those of the state couple q with q, those of forces come through F, and residuals that couple more leave
+// their rows T. The full Hessian is never stored.
 #ifndef CONTROLLER_OCP_OCP_CONTACT_MODEL_H_
 #define CONTROLLER_OCP_OCP_CONTACT_MODEL_H_
 
 #include "controller/ocp/ocp_actuation.h"
 #include "controller/ocp/ocp_dense_rows.h"
-#include "controller/ocp/ocp_view.h"
+#include "controller/ocp/ocp_residual.h"
 #include "controller/rbd/rbd_contact_derivatives.h"
 
 #include <cmath>
@@ -19,12 +20,20 @@
 
 namespace engram {
 
-template <class C> struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Robot>, double> {
+// Rows of coupled residuals, times the root of their weights; nothing if there are none.
+template <class L, int nt> struct CoupledModel {
+  alignas(64) double T[nt][L::nzp];
+  bool coupled;  // false: all rows are zero
+};
+template <class L> struct CoupledModel<L, 0> {};
+
+template <class C, int nt_ = 0>
+struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Robot>, double>, CoupledModel<LayoutOf<typename C::Robot>, nt_> {
   using R = typename C::Robot;
   using L = LayoutOf<R>;
-  static constexpr int nf = kContactRows<C>;
+  static constexpr int nf = kContactRows<C>, nt = nt_;
   alignas(64) double D[R::nv][L::nzp];             // d v' / d z                              (nv x nz)
-  alignas(64) double F[nf][L::nzp];                // d lambda / d z, rows of active contacts (nf x nz)
+  alignas(64) double F[nf][L::nzp];                // d lambda / d z, rows of active contacts, axes of the set (nf x nz)
   alignas(64) double Lz[L::nzp];                   // d l / d z                               (nz)
   alignas(64) double Hqq[R::nv][padded(R::nv)];    // lower triangle
   alignas(64) double h[L::nzp];                    // diagonal
@@ -40,15 +49,17 @@ template <class C> struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Rob
       for (int r = 0; r < rows; ++r)
         for (int t = 0; t < rows; ++t) s += F[first + r][i] * H[c][r][t] * F[first + t][j];
     }
+    if constexpr (nt > 0)
+      for (const auto& row : this->T) s += row[i] * row[j];
     return s;
   }
 };
 
 // The stored Hessian, as for a knot without contacts: block qq, and all blocks of the state.
-template <class C, int ld> inline void copy_hessian_qq(const ContactKnotModel<C>& m, double (*to)[ld]) {
+template <class C, int nt, int ld> inline void copy_hessian_qq(const ContactKnotModel<C, nt>& m, double (*to)[ld]) {
   for (int i = 0; i < C::Robot::nv; ++i) std::memcpy(to[i], m.Hqq[i], padded(i + 1) * sizeof(double));
 }
-template <class C, int ld> inline void copy_hessian_x(const ContactKnotModel<C>& m, double (*to)[ld]) {
+template <class C, int nt, int ld> inline void copy_hessian_x(const ContactKnotModel<C, nt>& m, double (*to)[ld]) {
   constexpr int nv = C::Robot::nv;
   copy_hessian_qq(m, to);
   for (int i = nv; i < LayoutOf<typename C::Robot>::nxp; ++i) {
@@ -56,7 +67,7 @@ template <class C, int ld> inline void copy_hessian_x(const ContactKnotModel<C>&
     to[i][i] = m.h[i];
   }
 }
-template <class C> inline constexpr bool kDiagonalHessian<ContactKnotModel<C>> = true;
+template <class C, int nt> inline constexpr bool kDiagonalHessian<ContactKnotModel<C, nt>> = true;
 
 // Calls f(c) for every contact of C, active or not, c a compile-time constant.
 template <class C, class F, int... c> inline void for_contact(F f, std::integer_sequence<int, c...>) {
@@ -65,7 +76,12 @@ template <class C, class F, int... c> inline void for_contact(F f, std::integer_
 template <class C, class F> inline void for_contact(F f) { for_contact<C>(f, std::make_integer_sequence<int, C::n>{}); }
 
 // What the lanes of kLanes knots (S = Pack) leave for the dense step.
-template <class C, class S> struct ContactLanes {
+template <class R, int nf, int nt, class S> struct CoupledLanes {
+  CoupledRow<R, nf, S> row[nt];
+};
+template <class R, int nf, class S> struct CoupledLanes<R, nf, 0, S> {};
+
+template <class C, int nt, class S> struct ContactLanes : CoupledLanes<typename C::Robot, kContactRows<C>, nt, S> {
   using R = typename C::Robot;
   RbdData<R, S> d;
   ContactData<C, S> cd;
@@ -75,9 +91,70 @@ template <class C, class S> struct ContactLanes {
   S H[C::n][6][6];                 // their Hessian
 };
 
+// m.F, so far seen from axes that move with the contacts' bodies and point as the world's, in the axes of the set.
+template <class C, int nt>
+inline void contact_finish_forces(const ContactData<C, Pack>& cd, int lane, unsigned active, ContactKnotModel<C, nt>& m) {
+  using L = LayoutOf<typename C::Robot>;
+  constexpr const ContactTree<C>& tree = kContactTree<C>;
+  for (int c = 0; c < C::n; ++c) {
+    if (!contact_active(active, c)) continue;
+    const int first = tree.first[c];
+    if constexpr (kContactAxes<C> == Axes::kLocal) {
+      for (int part = first; part < tree.first[c + 1]; part += 3)
+        for (int z = 0; z < L::nzp; ++z) {
+          const double f[3] = {m.F[part][z], m.F[part + 1][z], m.F[part + 2][z]};
+          for (int i = 0; i < 3; ++i)
+            m.F[part + i][z] = cd.R_WF[c](0, i).l[lane] * f[0] + cd.R_WF[c](1, i).l[lane] * f[1] + cd.R_WF[c](2, i).l[lane] * f[2];
+        }
+      continue;
+    }
+    // forces turn with the world's axes, not with the body: + w_k x lambda
+    for (int part = first; part < tree.first[c + 1]; part += 3)
+      for (int a = 0; a < tree.path_n[c]; ++a) {
+        const int k = L::oq + tree.path[c][a];
+        const Vec3<Pack>&w = cd.J[c][a].ang, l(cd.lambda[part], cd.lambda[part + 1], cd.lambda[part + 2]);
+        for (int i = 0; i < 3; ++i) {
+          const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+          m.F[part + i][k] += w[i1].l[lane] * l[i2].l[lane] - w[i2].l[lane] * l[i1].l[lane];
+        }
+      }
+  }
+}
+
+// m.T of the rows of coupled residuals, and their share of m.Lz.
+template <class C, int nt>
+inline void contact_finish_rows(const ContactLanes<C, nt, Pack>& in, int lane, unsigned active, ContactKnotModel<C, nt>& m) {
+  using L = LayoutOf<typename C::Robot>;
+  constexpr int nv = C::Robot::nv, nf = kContactRows<C>;
+  const ActiveRows<C> rows(active);
+  m.coupled = false;
+  for (int t = 0; t < nt; ++t) {
+    const auto& row = in.row[t];
+    const double w = std::sqrt(row.w.l[lane]);
+    std::memset(m.T[t], 0, sizeof(m.T[t]));
+    if (w == 0.0) continue;
+    m.coupled = true;
+    for (int k = 0; k < nv; ++k) {
+      m.T[t][L::oq + k] = row.q[k].l[lane];
+      m.T[t][L::ov + k] = row.v[k].l[lane];
+    }
+    double coefficient[nf] = {};
+    const double* from[nf] = {};
+    int n = 0;
+    for (int r = 0; r < rows.n; ++r) {
+      const double a = row.lambda[rows.row[r]].l[lane];
+      if (a == 0.0) continue;
+      coefficient[n] = a;
+      from[n++] = m.F[rows.row[r]];
+    }
+    dense_rows::combine<L::nzp>(m.T[t], n, coefficient, from, w);
+    for (int z = 0; z < L::nzp; ++z) m.Lz[z] += w * row.e.l[lane] * m.T[t][z];
+  }
+}
+
 // Fills D, F, E and G of the model of one lane. step: dt of a knot in time, 1 of an impact.
-template <class C>
-inline void contact_finish_dynamics(const ContactLanes<C, Pack>& in, int lane, unsigned active, double step, ContactKnotModel<C>& m) {
+template <class C, int nt>
+inline void contact_finish_dynamics(const ContactLanes<C, nt, Pack>& in, int lane, unsigned active, double step, ContactKnotModel<C, nt>& m) {
   using R = typename C::Robot;
   using L = LayoutOf<R>;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
@@ -138,19 +215,7 @@ inline void contact_finish_dynamics(const ContactLanes<C, Pack>& in, int lane, u
   }
   for (int k = 0; k < nv; ++k) m.D[k][L::ov + k] += 1.0;
 
-  // forces turn with the world's axes, not with the body: + w_k x lambda
-  for (int c = 0; c < C::n; ++c) {
-    if (!contact_active(active, c)) continue;
-    for (int part = 0; part < tree.rows[c]; part += 3)
-      for (int a = 0; a < tree.path_n[c]; ++a) {
-        const int first = tree.first[c] + part, k = L::oq + tree.path[c][a];
-        const Vec3<Pack>& w = in.cd.J[c][a].ang;
-        for (int i = 0; i < 3; ++i) {
-          const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-          m.F[first + i][k] += w[i1].l[lane] * in.cd.lambda[first + i2].l[lane] - w[i2].l[lane] * in.cd.lambda[first + i1].l[lane];
-        }
-      }
-  }
+  contact_finish_forces(in.cd, lane, active, m);
 
   if constexpr (kFreeBase<R>)
     for (int i = 0; i < 36; ++i) {
@@ -160,7 +225,8 @@ inline void contact_finish_dynamics(const ContactLanes<C, Pack>& in, int lane, u
 }
 
 // Fills the costs of the model of one lane, those of the forces for active contacts. After contact_finish_dynamics if any is active.
-template <class C> inline void contact_finish_costs(const ContactLanes<C, Pack>& in, int lane, unsigned active, ContactKnotModel<C>& m) {
+template <class C, int nt>
+inline void contact_finish_costs(const ContactLanes<C, nt, Pack>& in, int lane, unsigned active, ContactKnotModel<C, nt>& m) {
   using R = typename C::Robot;
   using L = LayoutOf<R>;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
@@ -189,6 +255,7 @@ template <class C> inline void contact_finish_costs(const ContactLanes<C, Pack>&
     }
     if (contact_active(m.forces, c)) dense_rows::combine<nzp>(m.Lz, tree.rows[c], coefficient, row, 1.0);
   }
+  if constexpr (nt > 0) contact_finish_rows(in, lane, active, m);
 }
 
 }  // namespace engram

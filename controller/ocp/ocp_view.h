@@ -33,10 +33,20 @@ template <class R> struct DofPath {
   }
 };
 
+// All dofs, in the form of a path.
+template <class R> struct AllDofs {
+  static constexpr int n = R::nv;
+  int dof[R::nv] = {};
+
+  constexpr AllDofs() {
+    for (int k = 0; k < n; ++k) dof[k] = k;
+  }
+};
+
 // Adds J' diag(w) r to the gradient and J' diag(w) J to the lower Hessian of the coordinates dofs, J (m x n).
-template <int m, int nv, class S, class Model>
-inline void add_gauss_newton(const S (&J)[m][nv], const int* dofs, int n, const S (&r)[m], const S (&w)[m], Model& M) {
-  S wJ[m][nv];
+template <int m, int columns, class S, class Model>
+inline void add_gauss_newton(const S (&J)[m][columns], const int* dofs, int n, const S (&r)[m], const S (&w)[m], Model& M) {
+  S wJ[m][columns];
   for (int i = 0; i < m; ++i)
     for (int a = 0; a < n; ++a) wJ[i][a] = w[i] * J[i][a];
   for (int a = 0; a < n; ++a) {

@@ -19,6 +19,8 @@
 #include "controller/rbd/rbd_frames.h"
 #include "controller/rbd/rbd_manifold.h"
 
+#include <type_traits>
+
 namespace engram {
 
 // A point may rotate (3 rows: its classical acceleration); a surface may not (6 rows: its spatial acceleration).
@@ -71,6 +73,11 @@ template <class C> struct ActiveRows {
   }
 };
 
+// The axes in which costs see the forces of a set: C::axes, or by default the world's, at the frame's origin (Crocoddyl's contacts of
+// kind WORLD and LOCAL_WORLD_ALIGNED both are so). The dynamics is the same either way.
+template <class C, class = void> inline constexpr Axes kContactAxes = Axes::kLocalWorldAligned;
+template <class C> inline constexpr Axes kContactAxes<C, std::void_t<decltype(C::axes)>> = C::axes;
+
 // Reference placements of the contacts, world axes; used if kp > 0.
 template <class C, class S> struct ContactReference {
   S p[C::n][3];  // [m]
@@ -91,11 +98,6 @@ template <class C, class S> struct ContactData {
   Motion<S> error[C::n];    // placement error in world axes, if kp > 0: log6 of a surface, p - p_ref of a point
   Mat<S, 6, 6> Jlog[C::n];  // d log6 of a surface in frame axes, if kp > 0
 };
-
-template <class S> inline S motion_entry(const Motion<S>& m, int row) { return row < 3 ? m.lin[row] : m.ang[row - 3]; }
-
-// m moved from the world origin to the point p.
-template <class S> inline Motion<S> moved_to(const Motion<S>& m, const Vec3<S>& p) { return {cross_add(m.ang, p, m.lin), m.ang}; }
 
 // Placements and Jacobians of the active contacts. After rbd_kinematics.
 template <class C, class R, class S>
@@ -183,6 +185,21 @@ inline void rbd_contact_forces(const RbdData<R, S>& d, unsigned active, ContactD
     for (int a = 0; a < tree.path_n[c]; ++a)
       for (int r = 0; r < tree.rows[c]; ++r)
         y[tree.path[c][a]] = madd(cd.U[c][a][r], cd.lambda[tree.first[c] + r], y[tree.path[c][a]]);
+  }
+}
+
+// The forces of the active contacts in the axes of the set, l (nf). After rbd_contact_forces.
+template <class C, class S> inline void rbd_contact_forces_seen(unsigned active, const ContactData<C, S>& cd, S* l) {
+  constexpr const ContactTree<C>& tree = kContactTree<C>;
+  for (int r = 0; r < kContactRows<C>; ++r) l[r] = cd.lambda[r];
+  static_assert(kContactAxes<C> != Axes::kWorld, "forces act at the contact: kLocal or kLocalWorldAligned");
+  if constexpr (kContactAxes<C> == Axes::kLocalWorldAligned) return;
+  for (int c = 0; c < C::n; ++c) {
+    if (!contact_active(active, c)) continue;
+    for (S* part = l + tree.first[c]; part < l + tree.first[c + 1]; part += 3) {
+      const Vec3<S> f = mul_transposed(cd.R_WF[c], Vec3<S>(part[0], part[1], part[2]));
+      for (int i = 0; i < 3; ++i) part[i] = f[i];
+    }
   }
 }
 

@@ -13,6 +13,22 @@ template <class R, class S> inline void rbd_frame_placement(const RbdData<R, S>&
   R_WF = matmul(d.R_WJ[i], constant33<S>(R::R_JF[frame]));
 }
 
+template <class S> inline S motion_entry(const Motion<S>& m, int row) { return row < 3 ? m.lin[row] : m.ang[row - 3]; }
+
+// m moved from the world origin to the point p.
+template <class S> inline Motion<S> moved_to(const Motion<S>& m, const Vec3<S>& p) { return {cross_add(m.ang, p, m.lin), m.ang}; }
+
+// How a spatial quantity of a frame is written down: at its origin in its own axes, at the world's origin in the world's axes, or at
+// its origin in the world's axes (Pinocchio's LOCAL, WORLD, LOCAL_WORLD_ALIGNED).
+enum class Axes : uint8_t { kLocal, kWorld, kLocalWorldAligned };
+
+template <Axes axes, class S> inline Motion<S> seen_from(const Motion<S>& m, const Mat3<S>& R_WF, const Vec3<S>& p_WF) {
+  if constexpr (axes == Axes::kWorld) return m;
+  const Motion<S> at = moved_to(m, p_WF);
+  if constexpr (axes == Axes::kLocalWorldAligned) return at;
+  return {mul_transposed(R_WF, at.lin), mul_transposed(R_WF, at.ang)};
+}
+
 // Jacobian (3 x nv) of a point p_W fixed to joint i: its velocity in world axes is J v.
 template <class R, class S>
 inline void rbd_point_jacobian(const RbdData<R, S>& d, int i, const Vec3<S>& p_W, Mat<S, 3, R::nv>& J) {

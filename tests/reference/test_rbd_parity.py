@@ -20,7 +20,7 @@ from engram.robots.tree import FREE, Tree, build, load, q_to_pin
 
 STATES = 1000
 TOLERANCE = 1e-10  # relative to the largest entry: rounding of 38 dofs, amplified by the condition of M in forward dynamics
-FRAME = {"panda": "hand_tcp", "talos": "left_gripper", "zoo": "tip"}
+FRAME = {"panda": "hand_tcp", "talos": "left_gripper", "anymal": "lf_foot", "zoo": "tip"}
 ROBOTS = ["panda", "talos"]  # compiled into the controller
 ZOO = Path(__file__).parent  # zoo/: joints of every kind about every sort of axis
 
@@ -103,7 +103,7 @@ def mujoco_dynamics(folder: Path, case: Case, model_file: Path) -> dict[str, np.
     """What MuJoCo says about the states, in our conventions."""
     library = folder / "tests" / "libmujoco_oracle.so"
     assert library.is_file(), f"{library} is missing: ninja -C {folder} mujoco_oracle"
-    tree, n, nv = case.tree, STATES, case.tree.nv
+    tree, n, nv = case.tree, len(case.q), case.tree.nv
     qpos, T, drift = case.q.copy(), np.tile(np.eye(nv), (n, 1, 1)), np.zeros((n, nv))
     if tree.kind[0] == FREE:
         qpos[:, 3:7] = case.q[:, [6, 3, 4, 5]]
