@@ -248,6 +248,7 @@ class Bench:
 
     def queries(self) -> None:
         """The memory: its tables beside scikit-learn, and one whole query."""
+        import learners
         import queries
         from threadpoolctl import threadpool_limits
 
@@ -272,6 +273,34 @@ class Bench:
         )
         for name, samples in mine.items():
             self.figures.add("query", name, samples, theirs.get(name), holds, None)
+            if name in peer.work:
+                print(learners.facts(*peer.work[name]))
+
+    def learners(self) -> None:
+        """Kinds of tables that the Panda's memory does not ask for, or not alone."""
+        import learners
+        from queries import one_by_one
+        from threadpoolctl import threadpool_limits
+
+        from engram.engine import engine
+        from engram.learn.contenders import table_bytes
+
+        self.figures.title("query: mixture, network, distance at the Panda's sizes beside scikit-learn's single predict")
+        with threadpool_limits(1):
+            for rival in learners.rivals():
+                x, table = learners.inputs(rival), engine.Table(rival.table)
+                mine, peer, holds = [], [], True
+                if rival.peer:
+                    holds = gate(f"query {rival.name}", {"difference": learners.error(rival, x)}, rival.tolerance)
+                    self.all_hold &= holds
+                for _ in range(self.rounds):
+                    mine.append(table.time_us(x, rival.answers))
+                    if rival.peer:
+                        peer.append(one_by_one(rival.peer, x))
+                theirs = Samples(np.concatenate(peer)) if peer else None
+                self.figures.add("query", rival.name, Samples(np.concatenate(mine)), theirs, holds, None)
+                print(learners.facts(table_bytes(rival.table), rival.operations))
+        print("  allocations: 0, no allocator is linked into the evaluators (tests/unit/test_symbols.py)")
 
     def gemm(self) -> None:
         """The limit of arithmetic: the best rate of a matrix product, under our flags and under the machine's own."""
@@ -299,6 +328,7 @@ def main() -> int:
         bench.problem(name)
     bench.rigid_body("panda")
     bench.queries()
+    bench.learners()
     bench.gemm()
     out = args.build / "figures" / "bench.json"
     bench.figures.write(out)

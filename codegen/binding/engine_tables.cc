@@ -15,6 +15,31 @@ namespace {
 
 using Floats = std::vector<float>;
 
+// Processor time of this thread [us]
+double thread_us() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e6 * double(t.tv_sec) + 1e-3 * double(t.tv_nsec);
+}
+
+// Time [us] of reading `bytes` once, n samples over the same memory: what no query of a table of that size can beat.
+NewArray read_us(std::size_t bytes, std::size_t n) {
+  constexpr int kWidth = 4 * TAB_LANES, kRepeat = 16;  // numbers side by side; readings in a sample, against the clock's own time
+  const Floats memory(bytes / sizeof(float) / kWidth * kWidth + kWidth, 1.0f);
+  NewArray us({n});
+  for (std::size_t sample = 0; sample < n; ++sample) {
+    const double start = thread_us();
+    for (int pass = 0; pass < kRepeat; ++pass) {
+      float sum[kWidth] = {};
+      for (std::size_t i = 0; i < memory.size(); i += kWidth)
+        for (int j = 0; j < kWidth; ++j) sum[j] += memory[i + j];
+      asm volatile("" : : "g"(sum) : "memory");
+    }
+    us.data()[sample] = (thread_us() - start) / kRepeat;
+  }
+  return us;
+}
+
 class Table {
  public:
   explicit Table(const nb::object& source) : held_(source, 0, 0), pad_(tab_pad(held_.head()->nout)) {
@@ -72,15 +97,10 @@ class Table {
     NewArray us({n});
     std::vector<int32_t> index(count);
     Floats weight(count), y(count * pad_);
-    const auto now = [] {
-      timespec t;
-      clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-      return 1e6 * double(t.tv_sec) + 1e-3 * double(t.tv_nsec);
-    };
     for (std::size_t row = 0; row < n; ++row) {
-      const double start = now();
+      const double start = thread_us();
       tab_answers(head, X.data() + row * head->nin, count, index.data(), weight.data(), y.data(), nullptr);
-      us.data()[row] = now() - start;
+      us.data()[row] = thread_us() - start;
     }
     return us;
   }
@@ -122,6 +142,8 @@ void bind_tables(nb::module_& engine) {
       .def("distance", &Table::distance, "X"_a, "Distance (n, 3, in the first column) and gradient (n, 3) of a signed distance.")
       .def("time_us", [](Table& t, const In<2>& X, int count) { return t.time_us(X, count).release(); }, "X"_a, "count"_a = 1,
            "Processor time of each query [us].");
+  engine.def("read_us", [](std::size_t bytes, std::size_t n) { return read_us(bytes, n).release(); }, "bytes"_a, "n"_a,
+             "Processor time [us] of reading that many bytes, n samples over the same memory.");
 }
 
 }  // namespace engram::binding

@@ -170,6 +170,13 @@ def test_table_info_and_check(tmp_path: Path, capsys: pytest.CaptureFixture) -> 
     assert engram("table", "info", tmp_path) == 0
     text = capsys.readouterr().out
     assert f"{NAME}_knn_v1" in text and "held-out error 0.1 [m] on 7" in text and "engram fit toy" in text
+    assert engram("table", "info", tmp_path, "knn") == 0
+    text = capsys.readouterr().out
+    assert (
+        "input b                     -1 .. 1           rad" in text and "array value              240 float32, 960 bytes" in text
+    )
+    assert engram("table", "info", tmp_path, "knm") == 2
+    assert "holds no table 'knm'; did you mean 'knn'" in capsys.readouterr().err
     assert engram("table", "check", tmp_path) == 0
     source = tmp_path / f"{NAME}_logit_v1.c"
     source.write_text(source.read_text().replace(c_float(1.5), c_float(1.25)))

@@ -8,6 +8,7 @@ from engram.paths import TABLES, relative
 
 EXAMPLES = """examples:
   engram table info panda_reach              what the tables in tables/panda_reach hold
+  engram table info panda_reach knn          one of them: its inputs with units and domain, and its arrays
   engram table check                         every table: files, digests, robot and task they belong to
   engram table diff tables/panda_reach old/  largest difference of every array
 """
@@ -19,6 +20,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     actions = parser.add_subparsers(dest="action", metavar="<action>", required=True)
     info = actions.add_parser("info", help="kinds, sizes and held-out errors")
     info.add_argument("folder", help="a folder, or its name in tables/")
+    info.add_argument("role", nargs="?", help="one table of it, by its name or the part between folder and version")
     check = actions.add_parser("check", help="compare files, data and digests; exit code 1 if something is wrong")
     check.add_argument("folder", nargs="*", help="folders, or their names in tables/ (default: all)")
     diff = actions.add_parser("diff", help="compare two folders; exit code 1 if they differ")
@@ -49,6 +51,26 @@ def info(folder: Path) -> int:
         print(f"  {table['name']:<24} {table['kind']:<6} {table['bytes']:>8} bytes  {sizes}")
         print(f"  {'':<24} held-out error {table['held_out_error']:.4g} {table['held_out_text']}")
     print(f"{len(manifest['files'])} files, {total} bytes in the tree")
+    return 0
+
+
+def detail(folder: Path, role: str) -> int:
+    """Print one table for people: inputs with units and domain, arrays with their storage."""
+    from engram.emit.read import read_folder
+
+    manifest, tables = read_folder(folder)
+    short = {table.name.removeprefix(f"{manifest['name']}_").rpartition("_v")[0]: table for table in tables}
+    table = short.get(role) or next((table for table in tables if table.name == role), None)
+    if table is None:
+        raise InputError(f"{relative(folder)} holds no table '{role}'; {closest(role, list(short))}")
+    print(f"{table.name}: {table.kind}, digest 0x{table.digest:016x}, {table.entry['bytes']} bytes")
+    print(f"held-out error {table.entry['held_out_error']:.4g} {table.entry['held_out_text']}")
+    print("sizes  " + "  ".join(f"{key} {value:g}" for key, value in table.entry["sizes"].items()))
+    lo, hi = (table.arrays[i].flat for i in (0, 1))
+    for (name, unit), a, b in zip(table.inputs, lo, hi, strict=True):
+        print(f"  input {name:<12} {a:>11.4g} .. {b:<11.4g} {unit}")
+    for array in table.arrays[2:]:
+        print(f"  array {array.name:<12} {array.flat.size:>9} {array.type}, {4 * array.words.size} bytes")
     return 0
 
 
@@ -99,7 +121,7 @@ def diff(first: Path, second: Path) -> int:
             if own.flat.size != other.flat.size:
                 print(f"{name}.{own.name}: {own.flat.size} and {other.flat.size} numbers")
             elif not np.array_equal(own.flat, other.flat):
-                gap = np.abs(own.flat - other.flat)
+                gap = np.abs(own.flat.astype(float) - other.flat.astype(float))
                 print(f"{name}.{own.name}: {np.count_nonzero(gap)} of {gap.size} differ, by at most {gap.max():.3g}")
         for key in ("robot_digest", "task_digest"):
             if getattr(a, key) != getattr(b, key):
@@ -110,7 +132,8 @@ def diff(first: Path, second: Path) -> int:
 def run(args: argparse.Namespace) -> int:
     """Run the action."""
     if args.action == "info":
-        return info(table_folder(args.folder))
+        folder = table_folder(args.folder)
+        return detail(folder, args.role) if args.role else info(folder)
     if args.action == "diff":
         return int(diff(*(table_folder(name) for name in args.folder)))
     folders = args.folder or sorted(str(path.parent) for path in TABLES.glob("*/MANIFEST.json"))

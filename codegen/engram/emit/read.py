@@ -30,6 +30,7 @@ class TableFile:
     robot_digest: int
     task_digest: int
     arrays: list[Array]
+    inputs: list[tuple[str, str]]  # name and unit of each
     entry: dict  # its entry of the manifest
 
     @property
@@ -81,7 +82,14 @@ def read_table(folder: Path, entry: dict) -> TableFile:
     if sorted(order) != sorted(values):
         raise InputError(f"{relative(path)}: its list of arrays does not match its arrays; {MEND}")
     arrays = [Array(name, "", values[name].reshape(1, -1)) for name in order]
-    return TableFile(entry["name"], entry["kind"], number("digest"), number("robot_digest"), number("task_digest"), arrays, entry)
+
+    def strings(key: str) -> list[str]:
+        found = re.search(rf"\.{key} = \(const char\* const\[\]\)\{{(.*)\}},", source)
+        return re.findall(r'"((?:[^"\\]|\\.)*)"', found.group(1)) if found else []
+
+    inputs = list(zip(strings("input_name"), strings("input_unit"), strict=True))
+    digests = (number(key) for key in ("digest", "robot_digest", "task_digest"))
+    return TableFile(entry["name"], entry["kind"], *digests, arrays, inputs, entry)
 
 
 def read_folder(folder: Path) -> tuple[dict, list[TableFile]]:

@@ -1,0 +1,163 @@
+"""Contenders for the memory of a reach: learners, and the controls they must beat. Each proposes ends and bows for a task.
+
+A learner maps the features of a task to the posture at the end and to the leading coefficients of the bow, with many answers if
+it can: that map has many modes. Controls: nothing at all, straight lines, random postures, nearest neighbours in as few bytes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from engram.emit import Gmr, Knn, Mlp, Table
+from engram.engine import engine
+from engram.learn.memory import Memory, Motions, bow_features
+from engram.learn.mixture import Conditional, condition, fit_bayesian, fit_gaussian
+from engram.learn.network import Network, fit_density, fit_ensemble
+
+ANSWERS = 8  # asked of every learner, as many as the memory has neighbours
+RANDOM = 8  # postures of the uniform control
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Sizes of the learners."""
+
+    leading: int = 12  # coefficients of the bow that mixtures predict; the others are left at their mean
+    components: int = 24  # of the mixtures
+    hidden: int = 64
+    depth: int = 2
+    members: int = 5  # of the ensemble
+    modes: int = 8  # of the mixture density network
+    epochs: int = 100
+    seed: int = 0
+
+
+def table_bytes(table: Table) -> int:
+    """Of the arrays of a table."""
+    return sum(4 * array.words.size for array in table.arrays())
+
+
+# (ends that inverse kinematics made of some of the postures, indices of these) -> coefficients of the bows (m, components)
+Bows = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+@dataclass(frozen=True)
+class Contender:
+    """`propose(x, start)`: postures (k, nq) at the end and their bows (None: straight lines), for features x and a start."""
+
+    name: str
+    propose: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, Bows | None]]
+    near: bool  # its postures are answers: inverse kinematics may only correct them, not wander off
+    tables: tuple[Table, ...] = ()
+    control: bool = False  # there to be beaten, not to be chosen
+
+    @property
+    def bytes(self) -> int:
+        """Of its tables."""
+        return sum(table_bytes(table) for table in self.tables)
+
+    def query_us(self, queries: int = 200) -> float:
+        """Median processor time of a query of its table, anywhere in its domain; 0 without a table."""
+        if not self.tables:
+            return 0.0
+        table = self.tables[0]
+        x = np.random.default_rng(0).uniform(table.lo, table.hi, (queries, len(table.lo)))
+        return float(np.median(engine.Table(table).time_us(x, ANSWERS)))
+
+
+def from_table(name: str, table: Table, nq: int, components: int, answers: int = ANSWERS, control: bool = False) -> Contender:
+    """A learner that is a table from features to (end, leading coefficients)."""
+    evaluator = engine.Table(table)
+
+    def propose(x: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, Bows]:
+        found = evaluator.answers(x[None], answers)
+        y = found["y"][0][found["index"][0] >= 0]
+        z = np.zeros((len(y), components))
+        z[:, : y.shape[1] - nq] = y[:, nq:]
+        return np.ascontiguousarray(y[:, :nq]), lambda ends, kept: z[kept]
+
+    return Contender(name, propose, True, (table,), control)
+
+
+def smaller(knn: Knn, size: int) -> Knn:
+    """The nearest-neighbour control at the same bytes: as many samples as fit, spread over the data."""
+    per_sample = 4 * (knn.x.shape[1] + -(-knn.value.shape[1] // 8) * 8)
+    keep = np.linspace(0, len(knn.x) - 1, int(np.clip(size // per_sample, 8, len(knn.x)))).round().astype(int)
+    return Knn(**{**common(knn), "role": "knn"}, x=knn.x[keep], scale=knn.scale, value=knn.value[keep])
+
+
+def common(table: Table) -> dict:
+    """What the tables of the same inputs share."""
+    return dict(inputs=table.inputs, lo=table.lo, hi=table.hi, held_out_error=0.0, held_out_text="not measured")
+
+
+def mixture_table(fitted: Conditional, **rest: object) -> Gmr:
+    """The table of a conditioned mixture."""
+    return Gmr(log_norm=fitted.log_norm, freedom=fitted.freedom, mean_x=fitted.mean_x, linv=fitted.linv, mean_y=fitted.mean_y,
+               slope=fitted.slope, var=fitted.var, **rest)  # fmt: skip
+
+
+def network_table(net: Network, **rest: object) -> Mlp:
+    """The table of a network."""
+    return Mlp(center=net.center, width=net.width, weights=net.weights, biases=net.biases, modes=net.modes, **rest)
+
+
+def learners(
+    motions: Motions, memory: Memory, settings: Settings, progress: Callable[[str], None] = lambda text: None
+) -> list[Contender]:
+    """All learners, fitted on the motions that are not held out, each with its nearest-neighbour control."""
+    train, nq, m = ~motions.held_out, motions.nq, memory.code.components
+    x = np.asarray(motions.x, np.float32).astype(float)[train]
+    z = memory.code.encode(motions.t, motions.q)
+    y = np.hstack([motions.q[:, -1], z[:, : settings.leading]])[train]
+    shared = {**common(memory.knn), "role": "learner"}
+    made = []
+
+    def mixture(fit: Callable) -> Gmr:
+        return mixture_table(condition(fit(x, y, settings.components, seed=settings.seed)), **shared)
+
+    sizes = dict(hidden=settings.hidden, depth=settings.depth, epochs=settings.epochs, seed=settings.seed)
+    for name, make in (
+        ("gmr", lambda: mixture(fit_gaussian)),
+        ("bgmr", lambda: mixture(fit_bayesian)),
+        ("mlp", lambda: network_table(fit_ensemble(x, y, members=settings.members, **sizes), **shared)),
+        ("mdn", lambda: network_table(fit_density(x, y, modes=settings.modes, **sizes), **shared)),
+    ):
+        progress(f"learner {name}")
+        learner = from_table(name, make(), nq, m)
+        control = smaller(memory.knn, learner.bytes)
+        made += [learner, from_table(f"{name}.knn_at_bytes", control, nq, m, control=True)]
+    return made
+
+
+def remembered(memory: Memory, nq: int) -> list[Contender]:
+    """The nearest neighbours of the memory, one and many."""
+    m = memory.code.components
+    return [from_table(f"knn{k}", memory.knn, nq, m, k) for k in (1, ANSWERS)]
+
+
+def regression(memory: Memory, q_home: np.ndarray) -> Contender:
+    """The process between given ends: postures as the lines', bows predicted once inverse kinematics has found the ends."""
+    nq = len(q_home)
+
+    def propose(x: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, Bows]:
+        def bows(ends: np.ndarray, kept: np.ndarray) -> np.ndarray:
+            n = len(ends)
+            return memory.regression.predict(bow_features(np.tile(start, (n, 1)), ends, np.tile(x[nq : nq + 3], (n, 1))))[0]
+
+        return np.array([q_home, start]), bows
+
+    return Contender("gpr", propose, False, (memory.gpr,))
+
+
+def controls(q_lo: np.ndarray, q_hi: np.ndarray, q_home: np.ndarray, seed: int) -> list[Contender]:
+    """No memory at all: standing still, straight lines to postures found from random ones, from home and from the start."""
+    rng = np.random.default_rng(seed)
+    return [
+        Contender("cold", lambda x, start: (np.zeros((0, len(q_lo))), None), False, control=True),
+        Contender("uniform", lambda x, start: (rng.uniform(q_lo, q_hi, (RANDOM, len(q_lo))), None), False, control=True),
+        Contender("line", lambda x, start: (np.array([q_home, start]), None), False),
+    ]
