@@ -9,11 +9,18 @@ EXAMPLES = """examples:
   engram data panda reach     first: the solved motions, build/data/panda_reach.npz
   engram fit panda reach      tables/panda_reach/*.c, *.S, *.bin, tables.h, MANIFEST.json
   engram fit panda reach --out /tmp/tables && engram table diff panda_reach /tmp/tables/panda_reach
+  engram fit panda reach --contest 0       the tables alone
 The same data give the same bytes: the process restarts itself with pinned instruction sets and one thread.
+
+The contest trains every learner (k-NN, regression, mixtures, networks) and solves held-out tasks from the best of its guesses,
+beside controls: standing still, straight lines, random postures, nearest neighbours in as many bytes as the learner takes.
+  success    arrives clear of obstacles within 50 iterations      subopt1, subopt3   median excess cost after 1 and 3 iterations
+  modes      distinct postures among its answers                  query us           one query of its table, median
 """
 LIMIT = 2_000_000  # bytes of all files of a memory
 HELD_OUT = 10  # every tenth motion is kept out of the tables, to measure their errors and to calibrate the trust
 TRIALS = 150  # of them, tasks on which guesses are tried
+CONTEST = 100  # of them, tasks on which the learners compete
 
 
 def add_parser(subparsers) -> argparse.ArgumentParser:
@@ -25,6 +32,9 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--out", type=Path, default=TABLES, help="where the tables' folder is (default: tables/)")
     parser.add_argument(
         "--trials", type=int, default=TRIALS, help=f"held-out tasks on which guesses are tried (default: {TRIALS})"
+    )
+    parser.add_argument(
+        "--contest", type=int, default=CONTEST, help=f"held-out tasks on which all learners compete (default: {CONTEST}; 0: none)"
     )
     return parser
 
@@ -68,6 +78,15 @@ def run(args: argparse.Namespace) -> int:
         print(f"fit:    {key:<26} {value:.4g} {unit}")
     write_figures("fit", [(f"fit.{name}.{key}", value, unit, int(motions.held_out.sum())) for key, value, unit in report])
     print(f"fit:    {relative(args.out / name)}: {len(manifest['files'])} files")
+    if args.contest > 0:
+        from engram.learn.contenders import Settings as LearnerSettings
+        from engram.learn.contest import hold_contest
+
+        verdict = hold_contest(
+            spec, memory, source, args.contest, LIMIT, LearnerSettings(), lambda text: print(f"contest: {text}", flush=True)
+        )
+        print("\n".join(f"contest: {line}" for line in verdict.lines))
+        write_figures("contest", [(f"contest.{name}.{key}", value, unit, args.contest) for key, value, unit in verdict.figures])
     if size > LIMIT:
         raise InputError(f"the tables take {size} bytes, the limit is {LIMIT}: fit fewer motions or coefficients")
     return 0

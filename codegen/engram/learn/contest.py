@@ -11,10 +11,12 @@ from dataclasses import dataclass, fields, replace
 from itertools import combinations
 
 import numpy as np
+from tqdm import tqdm
 
 from engram.data.reach import NEARLY, ReachSolver
 from engram.data.reach import Settings as SolverSettings
-from engram.learn.contenders import Contender, table_bytes
+from engram.learn.contenders import Contender, controls, learners, regression, remembered, table_bytes
+from engram.learn.contenders import Settings as LearnerSettings
 from engram.learn.dataset import Source
 from engram.learn.memory import Memory
 from engram.tasks.spec import TaskSpec
@@ -166,17 +168,9 @@ def judge(contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np
 
     def add(name: str, o: Outcomes, lowest: np.ndarray, size: int, us: float) -> None:
         after = suboptimality(o, lowest)
-        lines.append(
-            f"{name:<20}{100 * o.good.mean():>8.1f}%{after[0]:>10.3g}{after[1]:>10.3g}{o.modes.mean():>7.2f}{size:>10}{us:>10.1f}"
-        )
-        values = {
-            "success": o.good.mean(),
-            "subopt1": after[0],
-            "subopt3": after[1],
-            "modes": o.modes.mean(),
-            "bytes": size,
-            "query": us,
-        }
+        share, modes = float(o.good.mean()), float(o.modes.mean())
+        lines.append(f"{name:<20}{100 * share:>8.1f}%{after[0]:>10.3g}{after[1]:>10.3g}{modes:>7.2f}{size:>10}{us:>10.1f}")
+        values = {"success": share, "subopt1": after[0], "subopt3": after[1], "modes": modes, "bytes": size, "query": us}
         units = {"bytes": "byte", "query": "us"}
         figures.extend((f"{name}.{key}", float(value), units.get(key, "1")) for key, value in values.items())
 
@@ -193,3 +187,20 @@ def judge(contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np
     lines.append(f"solved from each member's guess, the first that succeeds: {100 * any_good.mean():.1f} %")
     figures.append(("ensemble.success_any", float(any_good.mean()), "1"))
     return Verdict(lines, figures, names)
+
+
+def hold_contest(
+    spec: TaskSpec, memory: Memory, source: Source, tasks: int, limit: int, settings: LearnerSettings,
+    progress: Callable[[str], None] = lambda text: None,
+) -> Verdict:  # fmt: skip
+    """Fit all learners, let them and the controls compete on `tasks` held-out motions, judge."""
+    robot = spec.robot
+    contenders = [
+        *controls(robot.q_lo, robot.q_hi, robot.q_home, settings.seed),
+        *remembered(memory, robot.nq),
+        regression(memory, robot.q_home),
+        *learners(source.motions, memory, settings, progress),
+    ]
+    progress(f"{len(contenders)} contenders on {tasks} held-out tasks")
+    outcomes, lowest = compete(spec, memory, source, contenders, tasks, lambda items: tqdm(items, unit="task", leave=False))
+    return judge(contenders, outcomes, lowest, limit)
