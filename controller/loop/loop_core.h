@@ -14,12 +14,9 @@
 namespace engram {
 
 // A plan is executed although its gaps (L1, rad and rad/s) are not quite closed: the next period closes them before they are reached,
-// if they are small, and smaller still in the near future.
+// if they are small (M::kLargestGap), and smaller still (M::kLargestNearGap) in the near future.
+// Nor may it be faster in the near future than M::kLargestSpeed times a velocity limit; a robot that is faster already may brake.
 inline constexpr int kNearKnots = 10;
-inline constexpr double kLargestNearGap = 0.1;
-inline constexpr double kLargestGap = 0.5;
-// Largest speed in the near future, of the velocity limit; a robot that is faster already may brake.
-inline constexpr double kLargestSpeed = 1.0;
 
 template <class M, class Self> class PlannerCore {
  public:
@@ -109,8 +106,8 @@ template <class M, class Self> void PlannerCore<M, Self>::take_task(int64_t utim
 template <class M, class Self> engram_status PlannerCore<M, Self>::judge(bool accepted) const {
   constexpr int near = kNearKnots < N ? kNearKnots : N;
   // gap 0 lies between the measured state and the first knot: the gains answer for it
-  if (!(solve_.open_gap(1, near) <= kLargestNearGap && solve_.open_gap(1, N) <= kLargestGap)) return ENGRAM_OPEN_GAPS;
-  if (!(solve_.speed(1, near) <= std::max(kLargestSpeed, solve_.speed(0, 0)))) return ENGRAM_TOO_FAST;
+  if (!(solve_.open_gap(1, near) <= M::kLargestNearGap && solve_.open_gap(1, N) <= M::kLargestGap)) return ENGRAM_OPEN_GAPS;
+  if (!(solve_.speed(1, near) <= std::max(M::kLargestSpeed, solve_.speed(0, 0)))) return ENGRAM_TOO_FAST;
   if (ending_ == ENGRAM_DEADLINE) return ENGRAM_DEADLINE;
   if (!accepted) return ENGRAM_NO_DESCENT;
   return solve_.stop() < kStop ? ENGRAM_CONVERGED : ENGRAM_ITERATING;

@@ -18,7 +18,6 @@
 
 namespace engram {
 
-inline constexpr double kOverspeed = 1.5;     // of the velocity limit: damping takes over
 inline constexpr double kLargestEntry = 1e3;  // a measured coordinate or velocity beyond it (rad, m, per s) is no measurement
 
 // True if x could be a measurement.
@@ -148,7 +147,7 @@ engram_status FastLoop<P, N, Hold>::command(int64_t utime, const double* q, cons
   }
   double fastest = 0.0;  // relative to the limit
   for (int i = base; good && i < nv; ++i) fastest = std::max(fastest, std::fabs(v[i]) / R::v_max[i]);
-  if (good) overspeed_ = fastest > (overspeed_ ? 1.0 : kOverspeed);
+  if (good) overspeed_ = fastest > (overspeed_ ? 1.0 : Hold::kOverspeed);
   if (overspeed_) rung = ENGRAM_RUNG_DAMPING;
   if (!good) {
     status = ENGRAM_BAD_STATE;

@@ -1,5 +1,6 @@
 // The lower rungs of the ladder, by the kind of robot. A Hold has
 //
+//   static constexpr double kOverspeed                       of the velocity limit: beyond it damping takes over
 //   void begin(double rate, const double* x)                 from now on keep the posture of x; rate: bandwidth [rad/s]
 //   void hold(const double* x, const double* v, double* u)   torque that keeps it in the state x, of which v is to be damped
 //   void damp(const double* x, const double* v, double* u)   torque that takes out the motion
@@ -27,6 +28,7 @@ template <class P> class DrivenHold {
  public:
   using R = typename P::R;
   static constexpr int nv = P::nv, nu = P::nu, first = nv - nu;
+  static constexpr double kOverspeed = 1.5;
 
   void begin(double rate, const double* x) {
     rate_ = rate;
@@ -58,6 +60,7 @@ template <class P> class StanceHold {
  public:
   using R = typename P::R;
   static constexpr int nv = P::nv, nu = P::nu, first = nv - nu, joint = P::nq - nu;
+  static constexpr double kOverspeed = 5.0;  // a push lets head and hands race, and a robot that is only damped falls
 
   void begin(double rate, const double* x) {
     std::memcpy(q_, x, sizeof(q_));

@@ -20,6 +20,7 @@ template <class Task_, class Memory_> struct ReachModel {
   static constexpr int N = Task::nknots;
   static constexpr int ntask = Task::ntask;
   static constexpr int kIterations = 4;  // per period
+  static constexpr double kLargestNearGap = 0.1, kLargestGap = 0.5, kLargestSpeed = 1.0;  // loop_core.h
   static constexpr int64_t kStepUs = static_cast<int64_t>(1e6 * Task::dt + 0.5);
   static constexpr int64_t kTickUs = 10000;
   static_assert(kStepUs % kTickUs == 0, "a knot is a whole number of ticks");

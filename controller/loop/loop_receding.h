@@ -6,7 +6,7 @@
 //
 // Whatever moves with time (references, contact phases) is the model's business. A model M of this planner has
 //
-//   using P, R, Target, Hold, Task (with its digest); static constexpr N, ntask, kStepUs, kTickUs
+//   using P, R, Target, Hold, Task (with its digest); static constexpr N, ntask, kStepUs, kTickUs, kIterations, kLargestNearGap, kLargestGap
 //   static bool target(const double* value, Target&), known(const double* value)      as for the reach planner
 //   void begin(int64_t utime, const double* x)                        the robot starts here, with knots at utime + m kStepUs
 //   void take(int64_t utime, const Target&)                           from utime on this is the task

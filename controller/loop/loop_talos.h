@@ -1,0 +1,45 @@
+// Talos as its tasks on legs share it: soles, and the terms of its problem.
+#ifndef CONTROLLER_LOOP_LOOP_TALOS_H_
+#define CONTROLLER_LOOP_LOOP_TALOS_H_
+
+#include "controller/loop/loop_legged.h"
+#include "tables/talos/robot.h"
+
+namespace engram {
+
+// kd_: damping of the contacts [1/s], times a knot's length below 1... 2.
+template <int kd_> struct TalosSoles {
+  using Robot = robots::Talos;
+  static constexpr int n = 2;
+  static constexpr int frame[n] = {Robot::kLeftSole, Robot::kRightSole};
+  static constexpr ContactKind kind[n] = {ContactKind::kSurface, ContactKind::kSurface};
+  static constexpr double kp = 0.0, kd = kd_;
+};
+
+template <class Task_, int kd> struct TalosBody {
+  using Task = Task_;
+  using Robot = robots::Talos;
+  using Soles = TalosSoles<kd>;
+  template <int c> using Swing = FramePlacementTerm<Robot, Soles::frame[c]>;
+  template <int c> using Cone = WrenchConeTerm<c>;
+  using P = ContactOcp<Soles, StateTerm<Robot>, TorqueTerm<Robot>, LimitTerm<Robot>, ComTerm<Robot>, Swing<0>, Swing<1>, Cone<0>, Cone<1>>;
+  static constexpr int legs = 12;  // driven dofs
+  static constexpr int64_t kTickUs = 10000;
+
+  template <class Param> static void cone(Param& p, double weight, double yaw) {
+    p.wrench_w = weight;
+    p.wrench_mu = Task::sole_friction;
+    for (int i = 0; i < 2; ++i) p.wrench_half[i] = Task::sole_half[i];
+    p.wrench_x[0] = std::cos(yaw);
+    p.wrench_x[1] = std::sin(yaw);
+  }
+  template <class Param> static void swing(Param& p, double weight, const Placement& at) {
+    p.placement_w = weight;
+    for (int i = 0; i < 3; ++i) p.placement_p[i] = at.p[i];
+    const double c = std::cos(at.yaw), s = std::sin(at.yaw), R_WF[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
+    for (int i = 0; i < 9; ++i) p.placement_R[i] = R_WF[i];
+  }
+};
+
+}  // namespace engram
+#endif  // CONTROLLER_LOOP_LOOP_TALOS_H_
