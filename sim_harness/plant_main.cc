@@ -12,11 +12,13 @@
 #include <ctime>
 
 #include "sim_harness/sim_faults.h"
+#include "sim_harness/sim_flight.h"
 #include "sim_harness/sim_judge.h"
 #include "sim_harness/sim_link.h"
 #include "sim_harness/sim_log.h"
 #include "sim_harness/sim_model.h"
 #include "sim_harness/sim_options.h"
+#include "sim_harness/sim_scenario.h"
 #include "sim_harness/sim_series.h"
 
 namespace engram::sim {
@@ -29,7 +31,8 @@ enum ExitCode { kOk = 0, kBadInput = 2, kLogTruncated = 3, kNoController = 4, kD
 volatile std::sig_atomic_t stopped = 0;  // by SIGINT or SIGTERM: the log is closed and the results are written
 
 struct PlantOptions {
-  std::string scene, series, log, results, timing;
+  std::string scene, series, scenario, log, results, timing;
+  std::string engine = "mujoco";
   std::string clock = "lockstep";
   std::string url = "udpm://239.255.76.67:7667?ttl=0&recv_buf_size=4000000";
   double duration = 0;    // s; 0: until the series ends
@@ -44,8 +47,8 @@ struct PlantOptions {
 };
 
 constexpr char kAbout[] =
-    "engram-plant: simulates the robot of a scene in MuJoCo (1 kHz, torque control) and talks LCM:\n"
-    "state_t and task_t out, command_t, cycle_t and timing_t in. Runs and judges a series of reach tasks.\n"
+    "engram-plant: simulates the robot of a scene (1 kHz, torque control) and talks LCM: state_t and task_t out, command_t,\n"
+    "cycle_t and timing_t in. Runs and judges a series of targets to reach, or a scenario to get through.\n"
     "Exit code: 0 done, 2 bad input, 3 done but the log is cut short, 4 no controller answers, 5 the simulation diverged,\n"
     "64 wrong option, 130 stopped by a signal.";
 
@@ -54,8 +57,10 @@ PlantOptions read_options(int argc, char** argv) {
   parse_options(
       argc, argv, kAbout,
       {{"--scene", "FILE", "MJCF of robot and world", &o.scene},
-       {"--series", "FILE", "tasks to run (sim_harness/sim_series.h); without it the robot is only simulated", &o.series},
-       {"--duration", "S", "end after this much simulated time; default: when the series ends", &o.duration},
+       {"--engine", "mujoco|cvode", "cvode: integrate one free body on thrusters to 1e-12; default mujoco", &o.engine},
+       {"--series", "FILE", "targets to reach (sim_harness/sim_series.h)", &o.series},
+       {"--scenario", "FILE", "episodes to get through (sim_harness/sim_scenario.h); without either, just simulate", &o.scenario},
+       {"--duration", "S", "end after this much simulated time; default: when series or scenario end", &o.duration},
        {"--lcm-url", "URL", "LCM provider; default udpm on port 7667, ttl 0", &o.url},
        {"--clock", "lockstep|wall", "wait for each command (reproducible), or keep real time", &o.clock},
        {"--log", "FILE", "LCM event log of state, task, cycle and command", &o.log},
@@ -73,15 +78,19 @@ PlantOptions read_options(int argc, char** argv) {
        {"--noise-v", "RAD/S", "standard deviation of measured velocities", &o.faults.noise_v},
        {"--latency", "STEPS", "plant steps from a command to its effect", &o.faults.latency},
        {"--push", "T,BODY,FX,FY,FZ,D", "force (N, world) on a body from T for D seconds; may be repeated", &o.faults.pushes},
-       {"--random-push-period", "S", "mean time between random pushes", &o.faults.random_push_period},
-       {"--random-push-force", "N", "their largest force", &o.faults.random_push_force},
-       {"--random-push-duration", "S", "their duration; default 0.1", &o.faults.random_push_duration}});
+       {"--random-push-period", "S", "mean time between random pushes", &o.faults.random_push.period},
+       {"--random-push-force", "N", "their largest force", &o.faults.random_push.force},
+       {"--random-push-duration", "S", "their duration; default 0.1", &o.faults.random_push.duration},
+       {"--gust-period", "S", "mean time between gusts of wind, forces that grow and fade", &o.faults.gust.period},
+       {"--gust-force", "N", "their largest force", &o.faults.gust.force},
+       {"--gust-duration", "S", "their duration; default 0.1", &o.faults.gust.duration}});
   return o;
 }
 
 class Plant {
  public:
-  explicit Plant(const PlantOptions& options) : o_(options), lock_step_(options.clock == "lockstep"), judge_(series_) {}
+  explicit Plant(const PlantOptions& options)
+      : o_(options), lock_step_(options.clock == "lockstep"), judge_(series_), referee_(scenario_) {}
   ~Plant() {
     if (timing_) std::fclose(timing_);
   }
@@ -93,6 +102,7 @@ class Plant {
   std::string write_results(double wall_seconds) const;
 
  private:
+  std::string read_script();
   void begin_step();
   bool wait_for_command();
   ExitCode answer_step();
@@ -103,7 +113,11 @@ class Plant {
   const bool lock_step_;
   Model model_;
   Series series_;
+  Scenario scenario_;
   Judge judge_;
+  Referee referee_;
+  Script* script_ = nullptr;  // judge_ or referee_
+  Flight flight_;
   Faults faults_;
   EventLog log_;
   Link link_;
@@ -118,21 +132,22 @@ class Plant {
 std::string Plant::init() {
   if (!lock_step_ && o_.clock != "wall") return "--clock takes lockstep or wall";
   if (o_.scene.empty()) return "--scene is missing; see --help";
-  if (o_.series.empty() && o_.duration <= 0) return "give --series or --duration; see --help";
+  if (o_.engine != "mujoco" && o_.engine != "cvode") return "--engine takes mujoco or cvode";
+  if (!o_.series.empty() && !o_.scenario.empty()) return "give --series or --scenario, not both; see --help";
+  if (o_.series.empty() && o_.scenario.empty() && o_.duration <= 0) return "give --series, --scenario or --duration; see --help";
   if (o_.log_every < 1 || o_.faults.latency < 0) return "--log-every must be at least 1 and --latency at least 0";
   std::string wrong = model_.load(o_.scene.c_str());
   if (!wrong.empty()) return wrong;
+  if (o_.engine == "cvode") wrong = flight_.init(model_);
+  if (wrong.empty()) wrong = read_script();
+  if (!wrong.empty()) return wrong;
   step_us_ = static_cast<int64_t>(model_.m->opt.timestep * 1e6 + 0.5);
 
-  if (!o_.series.empty()) {
-    wrong = series_.read(o_.series.c_str(), model_.nq, model_.nv);
-    if (wrong.empty()) wrong = model_.select_hand(series_.hand.c_str());
-    if (!wrong.empty()) return wrong;
-    if (model_.robot_digest && series_.robot_digest && model_.robot_digest != series_.robot_digest) {
-      return "scene and series are of different robots (digests differ); write both again with `engram task` and `engram demo`";
-    }
+  const uint64_t asked = o_.scenario.empty() ? series_.robot_digest : scenario_.robot_digest;
+  if (model_.robot_digest && asked && model_.robot_digest != asked) {
+    return "scene and script are of different robots (digests differ); write both again with `engram task` and `engram demo`";
   }
-  const uint64_t digest = o_.robot_digest ? o_.robot_digest : model_.robot_digest ? model_.robot_digest : series_.robot_digest;
+  const uint64_t digest = o_.robot_digest ? o_.robot_digest : model_.robot_digest ? model_.robot_digest : asked;
   wrong = faults_.init(o_.faults, model_);
   if (wrong.empty() && !o_.log.empty()) wrong = log_.open(o_.log.c_str(), static_cast<int64_t>(o_.log_full * 1e6), o_.log_every);
   if (wrong.empty() && !o_.timing.empty()) {
@@ -142,32 +157,47 @@ std::string Plant::init() {
   if (wrong.empty()) wrong = link_.open(o_.url.c_str(), digest, model_.nu, &log_, timing_);
   state_.robot_digest = static_cast<int64_t>(digest);
   state_.nq = model_.nq, state_.nv = model_.nv;
-  task_.task_digest = static_cast<int64_t>(series_.task_digest);
+  task_.task_digest = static_cast<int64_t>(o_.scenario.empty() ? series_.task_digest : scenario_.task_digest);
   return wrong;
+}
+
+std::string Plant::read_script() {
+  if (!o_.scenario.empty()) {
+    script_ = &referee_;
+    if (!model_.free_base) return "a scenario needs a robot with a free base";
+    return scenario_.read(o_.scenario.c_str(), model_);
+  }
+  if (o_.series.empty()) return "";
+  script_ = &judge_;
+  const std::string wrong = series_.read(o_.series.c_str(), model_.nq, model_.nv);
+  return wrong.empty() ? model_.select_hand(series_.hand.c_str()) : wrong;
 }
 
 bool Plant::finished() const {
   if (o_.duration > 0 && t_ > o_.duration) return true;
-  return !o_.series.empty() && judge_.finished();
+  return script_ && script_->finished();
 }
 
 // Publishes what the controller shall know about time t, then finds out about time t itself.
 void Plant::begin_step() {
-  Judge::Event event;
-  if (!o_.series.empty()) event = judge_.begin_step(t_);
+  Script::Event event;
+  if (script_) event = script_->begin_step(t_);
   if (event.reset) {
     const double rest[kMaxDof] = {};
     state_.seq = 0;
     faults_.restart();
     mj_resetData(model_.m, model_.d);
-    model_.set_state(event.reset->q.data(), rest);
+    model_.set_state(event.reset->data(), rest);
+  }
+  if (event.pushes) {
+    for (const Push& push : *event.pushes) faults_.add(push, t_);
   }
   if (event.task) {
     task_.utime = utime_;
     ++task_.seq;
     task_.jump = event.jump;
-    task_.n = static_cast<int32_t>(event.task->value.size());
-    std::copy(event.task->value.begin(), event.task->value.end(), task_.value);
+    task_.n = static_cast<int32_t>(event.task->size());
+    std::copy(event.task->begin(), event.task->end(), task_.value);
     link_.publish_task(task_);
     log_.add(utime_, EventLog::kTask, kTaskChannel, link_.task_bytes(), link_.task_size());
   }
@@ -180,8 +210,9 @@ void Plant::begin_step() {
   mj_step1(model_.m, model_.d);
   if (log_.keeps(utime_, state_.seq)) log_.add(utime_, EventLog::kState, kStateChannel, link_.state_bytes(), link_.state_size());
   log_.flush(utime_);
-  if (const JumpRecord* r = judge_.judge(model_, t_)) {
-    std::printf("jump %d/%d %s %.2f s\n", r->jump, series_.jump_count(), r->reason().c_str(), r->t_end - r->t_start);
+  const std::string ended = script_ ? script_->look(model_, t_) : "";
+  if (!ended.empty()) {
+    std::printf("%s\n", ended.c_str());
     std::fflush(stdout);
   }
 }
@@ -226,9 +257,17 @@ ExitCode Plant::answer_step() {
     }
   }
   model_.set_tau(faults_.delay(model_, tau));
-  judge_.command(model_.torque_share(), link_.command().status);
+  if (script_) script_->command(model_.torque_share(), link_.command().status);
   faults_.push(&model_, t_);
-  mj_step2(model_.m, model_.d);
+  if (o_.engine == "cvode") {
+    const std::string wrong = flight_.step(&model_);
+    if (!wrong.empty()) {
+      std::fprintf(stderr, "engram-plant: %s at t = %.3f s; the last commands in the log tell why\n", wrong.c_str(), t_);
+      return kDiverged;
+    }
+  } else {
+    mj_step2(model_.m, model_.d);
+  }
   for (const int warning : {mjWARN_BADQPOS, mjWARN_BADQVEL, mjWARN_BADQACC, mjWARN_BADCTRL}) {
     if (model_.d->warning[warning].number > 0) {  // MuJoCo has reset the robot, or let go of it
       std::fprintf(stderr, "engram-plant: the simulation diverged at t = %.3f s; the last commands in the log tell why\n", t_);
@@ -278,11 +317,12 @@ std::string Plant::write_results(double wall_seconds) const {
                static_cast<long long>(log_.events()), static_cast<long long>(log_.bytes()), log_.truncated() ? "true" : "false");
   std::fprintf(file,
                "  \"refused\": {\"malformed\": %lld, \"foreign_robot\": %lld, \"not_finite\": %lld, \"second_answer\": %lld},\n"
-               "  \"resends\": %lld,\n  \"stale_steps\": %lld,\n  \"jumps\": ",
+               "  \"resends\": %lld,\n  \"stale_steps\": %lld,\n  ",
                static_cast<long long>(refused.malformed), static_cast<long long>(refused.foreign_robot),
                static_cast<long long>(refused.not_finite), static_cast<long long>(refused.second_answer),
                static_cast<long long>(link_.resends()), static_cast<long long>(stale_steps_));
-  write_records(file, judge_.records());
+  if (script_) script_->write(file);
+  else std::fprintf(file, "\"jumps\": []");
   std::fprintf(file, "\n}\n");
   const bool failed = std::ferror(file) != 0;
   return std::fclose(file) != 0 || failed ? "cannot write '" + o_.results + "': the disk is full" : "";

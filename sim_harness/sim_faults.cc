@@ -29,8 +29,19 @@ std::string Faults::init(const FaultOptions& options, const Model& model) {
     }
     pushes_.push_back(push);
   }
-  next_random_push_ = options.random_push_period;
+  options_.gust.smooth = true;
+  for (RandomPushes* random : {&options_.random_push, &options_.gust}) random->next = random->period;
   return "";
+}
+
+double Push::share(double now) const {
+  if (now < t || now >= t + duration) return 0;
+  return smooth ? 0.5 * (1 - std::cos(6.283185307179586 * (now - t) / duration)) : 1;
+}
+
+void Faults::add(Push push, double now) {
+  push.t += now;
+  pushes_.push_back(push);
 }
 
 void Faults::measure(const Model& model, double* q, double* v) {
@@ -54,27 +65,31 @@ const double* Faults::delay(const Model& model, const double* tau) {
   return now_.data();
 }
 
+void Faults::strike(RandomPushes* random, const Model& model, double t) {
+  if (random->period <= 0 || t < random->next) return;
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  Push push;
+  push.t = t;
+  do {  // a body that moves
+    push.body = 1 + static_cast<int>(uniform(random_) * (model.m->nbody - 1));
+  } while (model.m->body_weldid[push.body] == 0);
+  const double height = 2.0 * uniform(random_) - 1.0, turn = 6.283185307179586 * uniform(random_);
+  const double level = std::sqrt(1.0 - height * height);
+  const double force = random->force * uniform(random_);
+  push.force[0] = force * level * std::cos(turn), push.force[1] = force * level * std::sin(turn), push.force[2] = force * height;
+  push.duration = random->duration;
+  push.smooth = random->smooth;
+  pushes_.push_back(push);
+  random->next = t - random->period * std::log(1.0 - uniform(random_));
+}
+
 void Faults::push(Model* model, double t) {
-  if (options_.random_push_period > 0 && t >= next_random_push_) {
-    std::uniform_real_distribution<double> uniform(0.0, 1.0);
-    Push push;
-    push.t = t;
-    do {  // a body that moves
-      push.body = 1 + static_cast<int>(uniform(random_) * (model->m->nbody - 1));
-    } while (model->m->body_weldid[push.body] == 0);
-    const double height = 2.0 * uniform(random_) - 1.0, turn = 6.283185307179586 * uniform(random_);
-    const double level = std::sqrt(1.0 - height * height);
-    const double force = options_.random_push_force * uniform(random_);
-    push.force[0] = force * level * std::cos(turn), push.force[1] = force * level * std::sin(turn),
-    push.force[2] = force * height;
-    push.duration = options_.random_push_duration;
-    pushes_.push_back(push);
-    next_random_push_ = t - options_.random_push_period * std::log(1.0 - uniform(random_));
-  }
+  strike(&options_.random_push, *model, t);
+  strike(&options_.gust, *model, t);
   if (pushes_.empty()) return;
   mju_zero(model->d->xfrc_applied, 6 * model->m->nbody);
   for (const Push& push : pushes_) {
-    if (t >= push.t && t < push.t + push.duration) mju_addTo3(model->d->xfrc_applied + 6 * push.body, push.force);
+    mju_addToScl3(model->d->xfrc_applied + 6 * push.body, push.force, push.share(t));
   }
   const auto over = [t](const Push& push) { return t >= push.t + push.duration; };
   pushes_.erase(std::remove_if(pushes_.begin(), pushes_.end(), over), pushes_.end());

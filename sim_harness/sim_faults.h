@@ -17,6 +17,18 @@ struct Push {
   int body = 0;         // MuJoCo body; the force acts at its centre of mass
   double force[3]{};    // N, world axes
   double duration = 0;  // s
+  bool smooth = false;  // a gust: grows and fades as (1 - cos) / 2
+
+  double share(double now) const;  // of the force, at a time
+};
+
+// Pushes out of nowhere, at times of a Poisson process.
+struct RandomPushes {
+  double period = 0;      // s, mean time between two; 0: none
+  double force = 0;       // N, the largest
+  double duration = 0.1;  // s
+  bool smooth = false;
+  double next = 0;        // s, of the next one
 };
 
 struct FaultOptions {
@@ -25,9 +37,8 @@ struct FaultOptions {
   double noise_v = 0;                 // standard deviation of measured velocities (rad/s or m/s)
   int latency = 0;                    // plant steps from a command to its effect
   std::vector<std::string> pushes;    // "t,body,fx,fy,fz,duration"
-  double random_push_period = 0;      // s, mean time between random pushes; 0: none
-  double random_push_force = 0;       // N
-  double random_push_duration = 0.1;  // s
+  RandomPushes random_push;           // on any moving body
+  RandomPushes gust;                  // wind
 };
 
 class Faults {
@@ -40,17 +51,20 @@ class Faults {
   const double* delay(const Model& model, const double* tau);
   // The robot was put elsewhere: commands under way are of no use any more.
   void restart() { queue_.clear(); }
+  // A push to come, t counted from `now`.
+  void add(Push push, double now);
   // Sets the external forces of time t.
   void push(Model* model, double t);
 
  private:
+  void strike(RandomPushes* random, const Model& model, double t);
+
   FaultOptions options_;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   std::deque<std::vector<double>> queue_;
   std::vector<double> now_;
   std::vector<Push> pushes_;
-  double next_random_push_ = 0;
 };
 
 }  // namespace engram::sim

@@ -31,10 +31,10 @@ void Judge::advance() {
   phase_ = episode_ < series_.episodes.size() ? Phase::kNextEpisode : Phase::kFinished;
 }
 
-Judge::Event Judge::begin_step(double t) {
+Script::Event Judge::begin_step(double t) {
   Event event;
   if (phase_ == Phase::kNextEpisode) {
-    event.reset = &series_.episodes[episode_];
+    event.reset = &series_.episodes[episode_].q;
     touching_ = false;
     phase_ = Phase::kNextJump;
   } else if (phase_ == Phase::kNextJump) {
@@ -43,7 +43,8 @@ Judge::Event Judge::begin_step(double t) {
     record.jump = static_cast<int>(records_.size()) + 1;
     record.t_start = t;
     records_.push_back(record);
-    event.task = target_ = &jump().target;
+    target_ = &jump().target;
+    event.task = &target_->value;
     held_since_ = -1;
     still_touching_ = touching_;
     phase_ = Phase::kJump;
@@ -52,7 +53,8 @@ Judge::Event Judge::begin_step(double t) {
       advance();
       return begin_step(t);
     }
-    event.task = target_ = &jump().moves[move_++];
+    target_ = &jump().moves[move_++];
+    event.task = &target_->value;
     next_move_time_ += move_ < jump().moves.size() ? jump().moves[move_].dt : target_->dt;
   }
   event.jump = static_cast<int>(records_.size());
@@ -106,6 +108,14 @@ const JumpRecord* Judge::judge(const Model& model, double t) {
   return &record;
 }
 
+std::string Judge::look(const Model& model, double t) {
+  const JumpRecord* r = judge(model, t);
+  if (!r) return "";
+  char line[128];
+  std::snprintf(line, sizeof line, "jump %d/%d %s %.2f s", r->jump, series_.jump_count(), r->reason().c_str(), r->t_end - r->t_start);
+  return line;
+}
+
 void Judge::command(double torque_share, int status) {
   if (phase_ != Phase::kJump) return;
   JumpRecord& record = records_.back();
@@ -113,24 +123,29 @@ void Judge::command(double torque_share, int status) {
   ++record.statuses[status >= 0 && status < kMaxStatus ? status : kMaxStatus - 1];
 }
 
-void write_records(std::FILE* file, const std::vector<JumpRecord>& records) {
-  std::fprintf(file, "[");
+void write_statuses(std::FILE* file, const int (&statuses)[kMaxStatus]) {
+  std::fprintf(file, "{");
+  const char* comma = "";
+  for (int status = 0; status < kMaxStatus; ++status) {
+    if (statuses[status] == 0) continue;
+    std::fprintf(file, "%s\"%d\": %d", comma, status, statuses[status]);
+    comma = ", ";
+  }
+  std::fprintf(file, "}");
+}
+
+void Judge::write(std::FILE* file) const {
+  std::fprintf(file, "\"jumps\": [");
   const char* separator = "\n";
-  for (const JumpRecord& r : records) {
+  for (const JumpRecord& r : records_) {
     std::fprintf(
         file,
         "%s    {\"episode\": %d, \"jump\": %d, \"t_start_s\": %.3f, \"t_end_s\": %.3f, \"success\": %s, \"reason\": \"%s\", "
         "\"arrival_s\": %.3f, \"contact_time_s\": %.3f, \"contact\": \"%s\", \"joint_excess\": %.6f, \"speed_share\": %.4f, "
-        "\"torque_share\": %.4f, \"position_error_m\": %.5f, \"rotation_error_rad\": %.5f, \"statuses\": {",
+        "\"torque_share\": %.4f, \"position_error_m\": %.5f, \"rotation_error_rad\": %.5f, \"statuses\": ",
         separator, r.episode, r.jump, r.t_start, r.t_end, r.success() ? "true" : "false", r.reason().c_str(), r.arrival,
         r.contact_time, r.contact.c_str(), r.joint_excess, r.speed_share, r.torque_share, r.position_error, r.rotation_error);
-    const char* comma = "";
-    for (int status = 0; status < kMaxStatus; ++status) {
-      if (r.statuses[status] == 0) continue;
-      std::fprintf(file, "%s\"%d\": %d", comma, status, r.statuses[status]);
-      comma = ", ";
-    }
-    std::fprintf(file, "}");
+    write_statuses(file, r.statuses);
     if (r.move_steps > 0) {
       std::fprintf(file, ", \"move\": {\"duration_steps\": %d, \"mean_error_m\": %.5f, \"max_error_m\": %.5f, \"contact\": %s}",
                    r.move_steps, r.move_error_sum / r.move_steps, r.move_error_max, r.move_contact ? "true" : "false");
@@ -138,7 +153,7 @@ void write_records(std::FILE* file, const std::vector<JumpRecord>& records) {
     std::fprintf(file, "}");
     separator = ",\n";
   }
-  std::fprintf(file, "%s]", records.empty() ? "" : "\n  ");
+  std::fprintf(file, "%s]", records_.empty() ? "" : "\n  ");
 }
 
 }  // namespace engram::sim

@@ -11,13 +11,8 @@
 
 namespace engram::sim {
 
-// A joint rests some tenths of a milliradian inside MuJoCo's soft limit; beyond this the limit counts as broken.
-constexpr double kJointTolerance = 1e-3;  // rad or m
-// Torques are clamped by the controller to the very limit: no more than rounding may be left.
-constexpr double kTorqueTolerance = 1e-9;  // 1, of the limit
 // A velocity limit is a barrier of the optimal control problem, not a clamp: the fast feedback may brush it.
 constexpr double kSpeedTolerance = 0.02;  // 1, of the limit
-constexpr int kMaxStatus = 32;
 
 // How one jump ended. Times in s of the plant clock unless stated.
 struct JumpRecord {
@@ -46,26 +41,20 @@ struct JumpRecord {
   std::string reason() const;  // "ok", or what failed, joined by '+': late, contact, limit
 };
 
-class Judge {
+class Judge : public Script {
  public:
   explicit Judge(const Series& series) : series_(series) {}
 
-  // What happens before the state of time t is published. An episode begins like a plant that restarts: the robot is put
-  // somewhere, its first state goes out alone, the first task comes with the second.
-  struct Event {
-    const Episode* reset = nullptr;  // put the robot there
-    const Target* task = nullptr;    // publish it
-    int jump = 0;                    // its jump counter
-  };
-  Event begin_step(double t);
+  Event begin_step(double t) override;
 
   // Judges the state of time t. Needs its positions and contacts (mj_step1). Returns the record of a jump that ended now, or
   // nullptr.
   const JumpRecord* judge(const Model& model, double t);
-  // Books the command that answered the state of time t.
-  void command(double torque_share, int status);
+  std::string look(const Model& model, double t) override;
+  void command(double torque_share, int status) override;
 
-  bool finished() const { return phase_ == Phase::kFinished; }
+  bool finished() const override { return phase_ == Phase::kFinished; }
+  void write(std::FILE* file) const override;
   const std::vector<JumpRecord>& records() const { return records_; }
 
  private:
@@ -82,9 +71,6 @@ class Judge {
   double held_since_ = -1, next_move_time_ = 0;
   std::vector<JumpRecord> records_;
 };
-
-// JSON array with one object for each record.
-void write_records(std::FILE* file, const std::vector<JumpRecord>& records);
 
 }  // namespace engram::sim
 

@@ -112,6 +112,9 @@ Pose Model::hand_pose() const {
   return pose;
 }
 
+double Model::tilt() const { return std::acos(std::clamp(d->xmat[9 * kBase + 8], -1.0, 1.0)); }
+double Model::heading() const { return std::atan2(d->xmat[9 * kBase + 3], d->xmat[9 * kBase]); }
+
 int Model::robot_world_contact() const {
   int deepest = -1;
   for (int i = 0; i < d->ncon; ++i) {

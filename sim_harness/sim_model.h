@@ -25,6 +25,7 @@ double position_error(const Pose& a, const Pose& b);
 double rotation_error(const Pose& a, const Pose& b);
 
 struct Model {
+  static constexpr int kBase = 1;  // MuJoCo's number of the robot's first body
   mjModel* m = nullptr;
   mjData* d = nullptr;
   int nq = 0, nv = 0, nu = 0;
@@ -51,6 +52,10 @@ struct Model {
 
   // The rest needs positions of the current qpos (mj_step1 or mj_forward).
   Pose hand_pose() const;
+  const double* com() const { return d->subtree_com + 3 * kBase; }         // of the robot (m)
+  const double* base_position() const { return d->xpos + 3 * kBase; }      // m
+  double tilt() const;     // rad, between the base's z and the vertical
+  double heading() const;  // rad, of the base's x about the vertical
   // Deepest contact between a moving body and a body welded to the world: index into d->contact, -1 if there is none.
   int robot_world_contact() const;
   const char* geom_label(int geom) const;  // its name, else its body's

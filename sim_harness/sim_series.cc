@@ -1,24 +1,12 @@
 #include "sim_harness/sim_series.h"
 
 #include <cmath>
-#include <cstdlib>
 #include <fstream>
-#include <sstream>
+
+#include "sim_harness/sim_lines.h"
 
 namespace engram::sim {
 namespace {
-
-// All the numbers left on a line; false if one of them is not a finite number.
-bool read_numbers(std::istringstream& line, std::vector<double>* out) {
-  std::string word;
-  while (line >> word) {
-    char* end = nullptr;
-    const double number = std::strtod(word.c_str(), &end);
-    if (*end || !std::isfinite(number)) return false;
-    out->push_back(number);
-  }
-  return true;
-}
 
 std::string take_target(const std::vector<double>& numbers, size_t at, Target* target) {
   if (numbers.size() < at + 8) return "a target needs a position, a quaternion x y z w and a task vector";
@@ -47,7 +35,7 @@ std::string Series::read(const char* path, int nq, int nv) {
   if (!file) return std::string("cannot read the series '") + path + "'; `engram demo` writes one from a seed";
   std::string text, key;
   int number = 0;
-  const auto fault = [&](const std::string& what) { return std::string(path) + ":" + std::to_string(number) + ": " + what; };
+  const auto fault = [&](const std::string& what) { return fault_at(path, number, what); };
 
   if (!std::getline(file, text) || text != "engram_series 1") {
     return std::string(path) + ":1: a series starts with `engram_series 1`; write it again with `engram demo`";

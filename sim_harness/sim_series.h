@@ -20,11 +20,9 @@
 #include <string>
 #include <vector>
 
-#include "sim_harness/sim_model.h"
+#include "sim_harness/sim_script.h"
 
 namespace engram::sim {
-
-constexpr int kMaxTask = 32;  // entries of task_t.value
 
 struct Target {
   double dt = 0;  // s after the target before it; 0 for a jump

@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <string>
 
 #include "controller/io/io_exit.h"
 #include "controller/io/io_realtime.h"
@@ -12,18 +13,28 @@
 namespace engram::io {
 namespace {
 
-const engram_model* const kModels[] = {&engram_panda_reach};
 constexpr const char* kModes[ENGRAM_MODE_COUNT] = {"memory", "line", "shift", "cold"};
 constexpr double kWallBudgetUs = 6000;  // leaves the feedback and the system a share of the 10 ms period
 
-void print_help(const Settings& s) {
+// "panda_reach"
+std::string name_of(const engram_model* model) {
+  return std::string(engram_describe(model)->robot) + "_" + engram_describe(model)->task;
+}
+
+std::string names_of(const Models& models) {
+  std::string names;
+  for (const engram_model* model : models) names += " " + name_of(model);
+  return names;
+}
+
+void print_help(const Settings& s, const Models& models) {
   std::printf(
       "engram-controller: steers a robot by model predictive control with a memory of motion, over LCM.\n"
       "\n"
       "It answers every ENGRAM_STATE with an ENGRAM_COMMAND, takes its target from ENGRAM_TASK, and publishes what it did on\n"
       "ENGRAM_CYCLE and ENGRAM_TIMING. It holds the robot where it stands until the first task arrives.\n"
       "\n"
-      "  --robot NAME, --task NAME   model to run (%s, %s)\n"
+      "  --model ROBOT_TASK          what to control (%s); this binary holds:%s\n"
       "  --lcm-url URL               LCM provider (%s)\n"
       "  --clock lockstep|wall       lockstep: one thread, iterations counted, reproducible to the bit (default).\n"
       "                              wall: commands at once on one thread, plans on another, iterations limited by time\n"
@@ -43,7 +54,7 @@ void print_help(const Settings& s) {
       "\n"
       "Ends on SIGINT or SIGTERM with a summary. Exit codes: 0 ended as asked, %d wrong usage, %d no network,\n"
       "%d another controller serves the robot already.\n",
-      engram_describe(s.model)->robot, engram_describe(s.model)->task, s.lcm_url, s.options.iterations, s.options.iterations_jump,
+      name_of(s.model).c_str(), names_of(models).c_str(), s.lcm_url, s.options.iterations, s.options.iterations_jump,
       s.options.starts, kWallBudgetUs, kExitUsage, kExitNetwork, kExitTaken);
 }
 
@@ -52,14 +63,6 @@ int wrong(const char* format, const char* what) {
   std::fprintf(stderr, format, what);
   std::fputs("; see --help\n", stderr);
   return kExitUsage;
-}
-
-const engram_model* find_model(const char* robot, const char* task) {
-  for (const engram_model* model : kModels) {
-    const engram_description& about = *engram_describe(model);
-    if (std::strcmp(about.robot, robot) == 0 && std::strcmp(about.task, task) == 0) return model;
-  }
-  return nullptr;
 }
 
 bool read_number(const char* text, double* value) {
@@ -77,10 +80,9 @@ bool read_count(const char* text, int32_t* value) {
 
 }  // namespace
 
-bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
+bool read_settings(int argc, char** argv, const Models& models, Settings* s, int* exit_code) {
   enum {
-    kRobot = 1,
-    kTask,
+    kModel = 1,
     kUrl,
     kClock,
     kMemory,
@@ -94,8 +96,7 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
     kVersion,
     kHelp
   };
-  static const option kOptions[] = {{"robot", required_argument, nullptr, kRobot},
-                                    {"task", required_argument, nullptr, kTask},
+  static const option kOptions[] = {{"model", required_argument, nullptr, kModel},
                                     {"lcm-url", required_argument, nullptr, kUrl},
                                     {"clock", required_argument, nullptr, kClock},
                                     {"memory", required_argument, nullptr, kMemory},
@@ -109,20 +110,26 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
                                     {"version", no_argument, nullptr, kVersion},
                                     {"help", no_argument, nullptr, kHelp},
                                     {nullptr, 0, nullptr, 0}};
-  s->model = kModels[0];
-  engram_default_options(s->model, &s->options);
-  s->options.clock = thread_cpu_us;
-  const char *robot = engram_describe(s->model)->robot, *task = engram_describe(s->model)->task;
-  bool budget_given = false;
   *exit_code = kExitUsage;
   opterr = 0;
+  s->model = *models.begin();
+  // Defaults depend on the model: find it first.
+  for (int c; (c = getopt_long(argc, argv, "", kOptions, nullptr)) != -1;) {
+    if (c != kModel) continue;
+    s->model = nullptr;
+    for (const engram_model* model : models)
+      if (name_of(model) == optarg) s->model = model;
+    if (s->model != nullptr) continue;
+    std::fprintf(stderr, "engram-controller: --model %s: this binary holds no such model, but:%s\n", optarg, names_of(models).c_str());
+    return false;
+  }
+  optind = 1;
+  engram_default_options(s->model, &s->options);
+  s->options.clock = thread_cpu_us;
+  bool budget_given = false;
   for (int c; (c = getopt_long(argc, argv, "", kOptions, nullptr)) != -1;) {
     switch (c) {
-      case kRobot:
-        robot = optarg;
-        break;
-      case kTask:
-        task = optarg;
+      case kModel:
         break;
       case kUrl:
         s->lcm_url = optarg;
@@ -166,21 +173,13 @@ bool read_settings(int argc, char** argv, Settings* s, int* exit_code) {
       case kVersion:
         return std::printf("engram-controller %s\n", engram_version()), *exit_code = 0, false;
       case kHelp:
-        return print_help(*s), *exit_code = 0, false;
+        return print_help(*s, models), *exit_code = 0, false;
       default:
         return *exit_code = wrong("unknown option or missing value: %s", argv[optind - 1]), false;
     }
   }
   if (optind < argc) return *exit_code = wrong("unexpected argument: %s", argv[optind]), false;
   if (s->clock == Clock::kWall && !budget_given) s->options.budget_us = kWallBudgetUs;
-  s->model = find_model(robot, task);
-  if (s->model == nullptr) {
-    std::fprintf(stderr, "engram-controller: no model '%s %s' in this binary; it holds:", robot, task);
-    for (const engram_model* model : kModels)
-      std::fprintf(stderr, " '%s %s'", engram_describe(model)->robot, engram_describe(model)->task);
-    std::fputs("\n", stderr);
-    return false;
-  }
   return true;
 }
 

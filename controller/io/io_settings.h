@@ -4,6 +4,8 @@
 
 #include "controller/engram.h"
 
+#include <initializer_list>
+
 namespace engram::io {
 
 enum class Clock { kLockstep, kWall };
@@ -18,8 +20,11 @@ struct Settings {
   bool realtime = false;
 };
 
+// The models that a program holds; the first one is the default.
+using Models = std::initializer_list<const engram_model*>;
+
 // Reads the command line. False: the program shall end with *exit_code; what there is to say has been said.
-bool read_settings(int argc, char** argv, Settings* settings, int* exit_code);
+bool read_settings(int argc, char** argv, const Models& models, Settings* settings, int* exit_code);
 
 }  // namespace engram::io
 #endif  // CONTROLLER_IO_IO_SETTINGS_H_

@@ -8,6 +8,7 @@
 #include "controller/loop/loop_plan.h"
 
 #include <algorithm>
+#include <type_traits>
 
 namespace engram {
 
@@ -28,6 +29,10 @@ class Deadline {
   double begin_, slowest_ = 0.0;
 };
 
+// True for a model whose controls the solver keeps within their box.
+template <class M, class = void> inline constexpr bool kBoxedControls = false;
+template <class M> inline constexpr bool kBoxedControls<M, std::void_t<decltype(M::kBoxedControls)>> = M::kBoxedControls;
+
 template <class M> class Solve {
  public:
   using P = typename M::P;
@@ -37,6 +42,7 @@ template <class M> class Solve {
     opts_.step_lengths = options.line_search;
     opts_.now_us = options.clock;
     opts_.stop = kStop;
+    opts_.box = kBoxedControls<M>;
   }
 
   Horizon<P, N> horizon;

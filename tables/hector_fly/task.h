@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct HectorFly {
   using Robot = robots::Hector;
   static constexpr char name[] = "hector_fly";
-  static constexpr uint64_t digest = 0x7df92fcd3213aab8;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0xb79b2eb74dfbbd34;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 4;
@@ -36,6 +36,17 @@ struct HectorFly {
 
   // <table>_<key> of task.toml
   static constexpr double success_position = 0x1.999999999999ap-5;  // 0.05
+  static constexpr double success_rotation = 0x1.9333333333333p+1;  // 3.15
+  static constexpr double success_time = 0x1.8p+2;  // 6
+  static constexpr double weights_position = 0x1.4p+3;  // 10
+  static constexpr double weights_rotation = 0x1p+0;  // 1
+  static constexpr double weights_velocity = 0x1p+0;  // 1
+  static constexpr double weights_spin = 0x1.999999999999ap-4;  // 0.1
+  static constexpr double weights_thrust = 0x1.47ae147ae147bp-6;  // 0.02
+  static constexpr double terminal_position = 0x1.4p+5;  // 40
+  static constexpr double terminal_rotation = 0x1p+2;  // 4
+  static constexpr double terminal_velocity = 0x1.ep+3;  // 15
+  static constexpr double terminal_spin = 0x1.999999999999ap-2;  // 0.4
 
   // obstacles: centre, axes and half sizes [m]
   static constexpr int nbox = 0;

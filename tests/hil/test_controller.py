@@ -120,7 +120,7 @@ def test_help_and_version_tell(build: Path) -> None:
     [
         (["--memory", "all"], "memory, line, shift or cold"),
         (["--clock", "sun"], "lockstep or wall"),
-        (["--robot", "r2d2"], "it holds: 'panda reach'"),
+        (["--model", "r2d2_fly"], "--model r2d2_fly: this binary holds no such model, but: panda_reach"),
         (["--iterations", "many"], "not a count"),
         (["--iterations", "0"], "must be 1 to 50"),
         (["--budget", "-1"], "budget_us"),

@@ -17,7 +17,8 @@ FORBIDDEN = (
     "malloc free _Znwm _ZdlPv __cxa_throw __gxx_personality_v0 _Unwind_Resume printf fwrite "
     "puts abort __assert_fail pthread_mutex_lock __cxa_guard_acquire _ZSt20__throw_length_errorPKc"
 ).split()
-ARCHIVES = ["controller/libengram_panda_reach.a", "controller/libengram_talos_stand.a", "controller/tab/libengram_tab.a"]
+MODELS = ["panda_reach", "talos_stand", "hector_fly"]
+ARCHIVES = [*(f"controller/libengram_{name}.a" for name in MODELS), "controller/tab/libengram_tab.a"]
 
 
 def symbols(files: list[Path], kind: str) -> set[str]:

@@ -70,12 +70,12 @@ def test_tables_of_a_motion_become_constants(tmp_path):
     shutil.copytree(MODELS / "hector", tmp_path / "hector")
     path = tmp_path / "hector" / "fly" / "task.toml"
     before = load_motion("hector", "fly", tmp_path)
-    path.write_text(path.read_text(encoding="utf-8") + "\n[weights]\nposition = 2.0\nvelocity = [1.0, 0.5]\n", encoding="utf-8")
+    path.write_text(path.read_text(encoding="utf-8") + "\n[extra]\nposition = 2.0\nvelocity = [1.0, 0.5]\n", encoding="utf-8")
     motion = load_motion("hector", "fly", tmp_path)
     assert motion.digest != before.digest
     text = task_header(motion)
-    assert "static constexpr double weights_position = 0x1p+1;  // 2\n" in text
-    assert "static constexpr double weights_velocity[2] = {0x1p+0, 0x1p-1};  // 1, 0.5\n" in text
+    assert "static constexpr double extra_position = 0x1p+1;  // 2\n" in text
+    assert "static constexpr double extra_velocity[2] = {0x1p+0, 0x1p-1};  // 1, 0.5\n" in text
 
 
 WRONG_MOTION = {
