@@ -90,11 +90,6 @@ template <class P> class HoverHold {
   double rate_ = 0.0, p_[3] = {}, yaw_ = 0.0;
 };
 
-struct NoFlightMemory {
-  static bool tables_fit() { return true; }
-  static uint64_t table_digest() { return 0; }
-};
-
 // Every knot asks for the way point, upright, at rest; thrusts within their limits (box of the solver).
 template <class Task_> class FlightModel {
  public:
@@ -102,7 +97,7 @@ template <class Task_> class FlightModel {
   using R = typename Task::Robot;
   using P = Ocp<R, FramePoseTerm<R, R::kBase>, StateTerm<R>, TorqueTerm<R>>;
   using Knot = typename P::template Knot<double>;
-  using Memory = NoFlightMemory;
+  using Memory = NoMemory;
   using Hold = HoverHold<P>;
   using Target = WayPoint;
   static constexpr int N = Task::nknots, ntask = Task::ntask, kIterations = 1;

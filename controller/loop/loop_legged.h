@@ -20,6 +20,7 @@
 #include "controller/loop/loop_gait.h"
 #include "controller/loop/loop_hold.h"
 #include "controller/loop/loop_lipm.h"
+#include "controller/loop/loop_receding.h"
 #include "controller/ocp/ocp_com.h"
 #include "controller/ocp/ocp_contact.h"
 #include "controller/ocp/ocp_frame.h"
@@ -34,11 +35,6 @@ struct LeggedCommand {
   Pace pace;
   double height = 0.0;             // of the centre of mass above its height at home [m]
   double depth = 0.0, rate = 0.0;  // squats: down by depth and back [m], rate times per second [Hz]
-};
-
-struct NoMemory {
-  static bool tables_fit() { return true; }
-  static uint64_t table_digest() { return 0; }
 };
 
 template <class C> class LeggedModel {

@@ -23,6 +23,12 @@
 
 namespace engram {
 
+// The memory of a model that has none.
+struct NoMemory {
+  static bool tables_fit() { return true; }
+  static uint64_t table_digest() { return 0; }
+};
+
 template <class M> class RecedingPlanner : public PlannerCore<M, RecedingPlanner<M>> {
  public:
   using Core = PlannerCore<M, RecedingPlanner<M>>;
