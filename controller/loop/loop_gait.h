@@ -74,7 +74,7 @@ template <class G> class Gait {
   // Stands on these feet from `slot` on, with the body between them.
   void begin(int64_t slot, const Placement (&feet)[nfeet], const Placement& body) {
     slot_ = first_ = slot;
-    cursor_ = {kStanding, 0};
+    cursor_ = {kStanding, 0, false};
     body_ = body;
     for (int f = 0; f < nfeet; ++f) {
       foot_[f] = feet[f];
@@ -148,9 +148,10 @@ template <class G> class Gait {
 
  private:
   static constexpr int kStanding = -1, kLead = -2;
-  // Where in the gait: index of the phase, and swings left before it may stop.
+  // Where in the gait: index of the phase, swings left before it may stop, and whether the phase began when it was to stop.
   struct Cursor {
     int index, left;
+    bool closing;
   };
 
   static int length(const Cursor& c) { return c.index == kStanding ? kEver : c.index == kLead ? G::lead : G::phase[c.index].slots; }
@@ -165,12 +166,12 @@ template <class G> class Gait {
     return n;
   }
   static Cursor after(const Cursor& c, bool walk) {
-    if (c.index == kStanding) return walk ? Cursor{kLead, swings()} : c;
-    if (c.index == kLead) return {0, swings()};
+    if (c.index == kStanding) return walk ? Cursor{kLead, swings(), false} : c;
+    if (c.index == kLead) return {0, swings(), !walk};
     const bool swung = G::phase[c.index].swing != 0;
-    const int next = (c.index + 1) % G::nphases, left = walk ? swings() : c.left - swung;
-    if (left <= 0 && !swung) return {kStanding, 0};
-    return {next, left};
+    const int left = walk ? swings() : c.left - (swung && c.closing);
+    if (left <= 0 && !swung) return {kStanding, 0, false};
+    return {(c.index + 1) % G::nphases, left, !walk};
   }
 
   static void step_body(const Pace& pace, Placement& b) {
@@ -224,7 +225,7 @@ template <class G> class Gait {
     double x = 0.0, y = 0.0, yaw = 0.0;
   };
   int64_t slot_ = 0, first_ = 0;  // now; where the phase under way began
-  Cursor cursor_ = {kStanding, 0};
+  Cursor cursor_ = {kStanding, 0, false};
   Placement foot_[nfeet], body_;  // as the phase under way began; now
   Offset offset_[nfeet];          // of a foot from the body when it stands [m, rad]
   double zmp_[2] = {};            // as the phase under way began

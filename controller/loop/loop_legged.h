@@ -249,8 +249,8 @@ template <class C> void LeggedModel<C>::knot(int64_t utime, int64_t slot, double
   for (int i = 0; i < R::nv; ++i) {
     const bool leg = i < 6 + C::legs;
     k.state_ref[R::nq + i] = 0.0;
-    k.state_w[i] = weight * (i < 3 ? 0.0 : i < 6 ? W::weights_orientation : leg ? W::weights_legs : W::weights_upper);
-    k.state_w[R::nv + i] = velocity * (i < 6 ? W::weights_base_velocity : leg ? W::weights_legs_velocity : W::weights_upper_velocity);
+    k.state_w[i] = weight * (i < 3 ? 0.0 : i < 6 ? W::weights_orientation : W::weights_posture[leg ? 0 : 1]);
+    k.state_w[R::nv + i] = velocity * (i < 6 ? W::weights_base_velocity : W::weights_velocity[leg ? 0 : 1]);
   }
   const int at = static_cast<int>(slot - gait_.slot());
   const double when = static_cast<double>(utime - origin_) / static_cast<double>(kStepUs), part = when - static_cast<double>(slot);

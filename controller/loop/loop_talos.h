@@ -1,13 +1,13 @@
-// Talos as its tasks on legs share it: soles, and the terms of its problem.
+// Talos on its soles: the terms of its problem, and its tasks.
 #ifndef CONTROLLER_LOOP_LOOP_TALOS_H_
 #define CONTROLLER_LOOP_LOOP_TALOS_H_
 
 #include "controller/loop/loop_legged.h"
-#include "tables/talos/robot.h"
+#include "tables/talos_stand/task.h"
 
 namespace engram {
 
-// kd_: damping of the contacts [1/s], times a knot's length below 1... 2.
+// kd_: damping of the contacts [1/s].
 template <int kd_> struct TalosSoles {
   using Robot = robots::Talos;
   static constexpr int n = 2;
@@ -38,6 +38,20 @@ template <class Task_, int kd> struct TalosBody {
     for (int i = 0; i < 3; ++i) p.placement_p[i] = at.p[i];
     const double c = std::cos(at.yaw), s = std::sin(at.yaw), R_WF[9] = {c, -s, 0, s, c, 0, 0, 0, 1};
     for (int i = 0; i < 9; ++i) p.placement_R[i] = R_WF[i];
+  }
+};
+
+// Stands: height and squats of the centre of mass over feet that stay. Takes pushes without a step.
+struct TalosStand : TalosBody<tasks::TalosStand, 50> {
+  struct Gait {  // none
+    static constexpr int nfeet = 2, nphases = 1, lead = 1;
+    static constexpr GaitPhase phase[nphases] = {{0u, 1}};
+    static constexpr double slot = Task::dt, swing_height = 0.0;
+  };
+  static void command(const double* task, LeggedCommand& c) {
+    c.height = task[0];
+    c.depth = task[1];
+    c.rate = task[2];
   }
 };
 

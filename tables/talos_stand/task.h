@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct TalosStand {
   using Robot = robots::Talos;
   static constexpr char name[] = "talos_stand";
-  static constexpr uint64_t digest = 0x88c57686f05e5d6e;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x392337bb423c3387;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 3;
@@ -34,11 +34,9 @@ struct TalosStand {
 
   // <table>_<key> of task.toml
   static constexpr double weights_orientation = 0x1.388p+12;  // 5000
-  static constexpr double weights_legs = 0x1p+0;  // 1
-  static constexpr double weights_upper = 0x1.4p+3;  // 10
+  static constexpr double weights_posture[2] = {0x1p+0, 0x1.4p+3};  // 1, 10
   static constexpr double weights_base_velocity = 0x1.ep+4;  // 30
-  static constexpr double weights_legs_velocity = 0x1.4p+2;  // 5
-  static constexpr double weights_upper_velocity = 0x1.4p+3;  // 10
+  static constexpr double weights_velocity[2] = {0x1.4p+2, 0x1.4p+3};  // 5, 10
   static constexpr double weights_com[3] = {0x1.f4p+9, 0x1.f4p+9, 0x1.86ap+16};  // 1000, 1000, 100000
   static constexpr double weights_torque = 0x1.0624dd2f1a9fcp-10;  // 0.001
   static constexpr double weights_torque_scale = 0x1.9p+6;  // 100
