@@ -5,11 +5,12 @@ SHELL := /bin/bash
 SEED ?= 1
 export JOBS PYTHON
 
-.PHONY: help demo test bench tables clean setup
+.PHONY: help demo test bench tables study clean setup
 help:
 	@echo "make demo    run the arm that remembers: video, report and summary in runs/<time>/   (SEED=n)"
 	@echo "make test    build everything and run every test"
 	@echo "make bench   time the controller beside its peers"
+	@echo "make study   make a row of the thesis again beside ours: S=6.3, or S=6 for a chapter   (QUICK=1)"
 	@echo "make tables  rebuild the generated tables from models/"
 	@echo "make clean   remove everything that was built (runs/ and .venv/ stay)"
 
@@ -30,6 +31,10 @@ bench: setup
 
 tables: setup
 	@scripts/tables.sh
+
+study: export TARGETS = _engine
+study: setup
+	@.venv/bin/engram study $(S) $(if $(QUICK),--quick) $(ARGS)
 
 clean:
 	@rm -rf build

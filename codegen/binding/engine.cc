@@ -10,4 +10,5 @@ NB_MODULE(_engine, engine) {
   engram::binding::bind_memory(engine);
   engram::binding::bind_tensor_train(engine);
   engram::binding::bind_tables(engine);
+  engram::binding::bind_study(engine);
 }

@@ -1,0 +1,38 @@
+"""Make a row of the thesis again: its table beside ours, its picture, and the figures."""
+
+import argparse
+import os
+
+ROWS = {"6.1": "functions", "6.3": "panda"}
+
+EXAMPLES = """examples:
+  engram study 6.3              inverse kinematics of the Panda, table 7.1; build/figures/study.6.3.json
+  engram study 6                all rows of chapter 7
+  engram study 6.3 --quick      a short form, to see that it works
+Also: make study S=6.3, make study S=6 QUICK=1.
+"""
+
+
+def add_parser(subparsers) -> argparse.ArgumentParser:
+    """Arguments of `engram study`."""
+    parser = subparsers.add_parser("study", help=__doc__, description=__doc__, epilog=EXAMPLES)
+    parser.add_argument("rows", nargs="+", help=f"rows of the mission: {', '.join(ROWS)}; 6 for all of them")
+    parser.add_argument("--quick", action="store_true", help="fewer seeds, tasks and samples: seconds")
+    return parser
+
+
+def run(args: argparse.Namespace) -> int:
+    """Run the rows in order."""
+    import importlib
+
+    from engram.inputs import InputError, closest
+
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(name, "1")
+    rows = [row for asked in args.rows for row in (ROWS if asked == "6" else [asked])]
+    for row in rows:
+        if row not in ROWS:
+            raise InputError(f"no study '{row}'; {closest(row, list(ROWS))}")
+    for row in rows:
+        importlib.import_module(f"engram.study.{ROWS[row]}").run(row, args.quick)
+    return 0

@@ -1,0 +1,99 @@
+"""S6.3 to S6.5: the Panda among table, box and shelf."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from engram.engine import engine
+from engram.paths import MODELS
+from engram.study.report import Report
+from engram.study.trains import WORKERS, Recipe, build, samples
+from engram.study.warmstart import ALPHAS, Neighbours, compare, modes
+from engram.tasks.world import read_boxes
+
+CLEARANCE = 0.06  # [m] of a target to the nearest obstacle: "sufficiently away from the surface" (thesis, caption of table 7.1)
+
+THESIS = {  # success in per cent for 1, 10, 100, 1000 samples (tables 7.1 to 7.3)
+    "6.3": {"a09": [94, 98, 98, 99], "a075": [84, 95, 95, 97], "a05": [88, 93, 93, 98], "a0": [71, 91, 91, 96],
+            "uniform": [37.75, 45.5, 59.25, 75]},
+    "6.4": {"a09": [62, 86, 86, 88], "a075": [53, 72, 86, 83], "a05": [50, 64, 83, 84], "a0": [46, 60, 82, 86],
+            "uniform": [19.25, 28.75, 41, 53.5]},
+    "6.5": {"a09": [70, 81, 79, 89], "a075": [66, 66, 84, 78], "a05": [54, 62, 77, 76], "a0": [48, 48, 58, 71],
+            "uniform": [23.75, 30.25, 39.5, 44.25]},
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Study:
+    """One table: its cost, how the train is built, and how many tasks it is judged on."""
+
+    cost: str
+    title: str
+    recipe: Recipe
+    validation: int
+    test: int
+    joints: slice  # of the first posture, in which solutions are told apart
+
+
+STUDIES = {
+    "6.3": Study("panda.ik", "inverse kinematics, Panda with table, box and shelf, d = 10 (table 7.1)",
+                 Recipe(points=(40, 50), rank=16, enrich=16, sweeps=4, starts=2000), 400, 400, slice(3, 10)),
+}  # fmt: skip
+
+
+class Tasks:
+    """Targets in the shelf (and above the box) that keep their distance from the obstacles."""
+
+    def __init__(self, cost: engine.StudyCost):
+        self.lo, self.hi = np.array(cost.lo[: cost.ntask]), np.array(cost.hi[: cost.ntask])
+        self.boxes = read_boxes(MODELS / "panda" / "reach" / "world.xml")
+
+    def __call__(self, rng: np.random.Generator, count: int) -> np.ndarray:
+        kept = np.empty((0, len(self.lo)))
+        while len(kept) < count:  # two in three are kept
+            task = rng.uniform(self.lo, self.hi, (count, len(self.lo)))
+            clear = [self.boxes.distance(task[:, i : i + 3]).min(axis=1) > CLEARANCE for i in range(0, len(self.lo), 3)]
+            kept = np.concatenate([kept, task[np.all(clear, axis=0)]])
+        return kept[:count]
+
+
+def run(row: str, quick: bool) -> None:
+    """Build, choose on validation tasks, judge on others."""
+    study = STUDIES[row]
+    report = Report(row, study.title)
+    recipe, ntest, nvalidation = study.recipe, study.test, study.validation
+    if quick:
+        recipe, ntest, nvalidation = replace(recipe, seeds=2, starts=recipe.starts // 3), 40, 40
+    counts = (1, 10, 100) if quick else (1, 10, 100, 1000)
+    cost = engine.study_arm(study.cost)
+    draw = Tasks(cost)
+    validation, test = draw(np.random.default_rng(1001), nvalidation), draw(np.random.default_rng(2002), ntest)
+
+    built = build(cost, recipe, draw, validation)
+    tried = ", ".join(f"{100 * v:.1f}" for v in built.validation)
+    report.say(f"{recipe.seeds} seeds, validation success less a thousandth of the cost: {tried}; kept: seed {built.seed}")
+    report.say(f"table {built.train.bytes} B ({recipe.type}), rank {recipe.rank}; built in {built.cpu:.1f} s of CPU time, "
+               f"{built.wall:.1f} s on {WORKERS} threads; {built.values} values of the density")  # fmt: skip
+    report.figure("table_bytes", built.train.bytes, "B")
+    report.figure("build_cpu_s", built.cpu, "s")
+    report.figure("build_wall_s", built.wall, "s")
+
+    neighbours = Neighbours(cost, draw, recipe, built.train.bytes, seed=3003)
+    compare(report, cost, built, neighbours, validation, test, recipe.evaluations, THESIS[row], counts)
+    count_modes(report, cost, built, neighbours, test[: 10 if quick else 100], recipe.evaluations, study.joints)
+    report.close()
+
+
+def count_modes(report, cost, built, neighbours, tasks, evaluations: int, joints: slice) -> None:
+    """Distinct solutions among 20 refined samples: what a train has and nearest neighbours have not."""
+    names = {0.9: "a09", 0.75: "a075", 0.5: "a05", 0.0: "a0"}
+    parts = []
+    for alpha in ALPHAS:
+        found = modes(cost, samples(built.train, cost, tasks, alpha, 20), evaluations, joints)
+        report.figure(f"modes.{names[alpha]}", found, n=len(tasks))
+        parts.append(f"alpha {alpha:g}: {found:.1f}")
+    found = modes(cost, np.stack([neighbours.starts(cost, task, 20) for task in tasks]), evaluations, joints)
+    report.figure("modes.knn", found, n=len(tasks))
+    report.say("distinct solutions among 20 refined: " + ", ".join(parts) + f", 20 neighbours: {found:.1f}")

@@ -1,0 +1,51 @@
+// The Panda among table, box and shelf: costs of thesis tables 7.1 to 7.3.
+#include "codegen/offline/study_arm.h"
+#include "codegen/offline/study_costs.h"
+#include "controller/ocp/ocp_obstacles.h"
+#include "tables/panda_reach/task.h"
+
+namespace engram::offline {
+namespace {
+
+struct PandaSetup {
+  using Robot = robots::Panda;
+  using Field = BoxField<tasks::PandaReach>;
+  static constexpr int frame = Robot::kHandTcp;
+  static constexpr double clearance = 0.02;
+  // the hand lies level: its x axis, normal to approach and finger travel, is vertical
+  template <class S> static S orientation(const Mat3<S>& R_WF, Vec3<S>& moment) { return vertical_axis<S>(R_WF.column(0), moment); }
+};
+
+// Where targets are: in the shelf, above the box [m].
+constexpr double kShelfLo[3] = {0.48, -0.30, 0.12}, kShelfHi[3] = {0.70, 0.30, 0.68};
+constexpr double kBoxLo[3] = {0.12, 0.44, 0.30}, kBoxHi[3] = {0.32, 0.60, 0.42};
+
+template <class F> std::unique_ptr<StudyCost> bounded(int stops, int postures, int motions) {
+  using R = PandaSetup::Robot;
+  auto cost = std::make_unique<StudyCostOf<F, Pack>>(F{});
+  cost->ntask = 3 * stops;
+  for (int i = 0; i < stops; ++i) {
+    cost->lo.insert(cost->lo.end(), i == 0 ? kShelfLo : kBoxLo, (i == 0 ? kShelfLo : kBoxLo) + 3);
+    cost->hi.insert(cost->hi.end(), i == 0 ? kShelfHi : kBoxHi, (i == 0 ? kShelfHi : kBoxHi) + 3);
+  }
+  const auto joints = [&](int times_each) {
+    for (int k = 0; k < R::nq; ++k) {
+      cost->lo.insert(cost->lo.end(), times_each, R::q_lo[k]);
+      cost->hi.insert(cost->hi.end(), times_each, R::q_hi[k]);
+    }
+  };
+  for (int i = 0; i < postures; ++i) joints(1);
+  for (int i = 0; i < motions; ++i) joints(Primitive::kBasis);  // weights within the joint limits, as in the thesis
+  return cost;
+}
+
+}  // namespace
+
+std::unique_ptr<StudyCost> panda_cost(const std::string& what) {
+  if (what == "ik") return bounded<InverseKinematicsCost<PandaSetup>>(1, 1, 0);
+  if (what == "reach") return bounded<MotionCost<PandaSetup, 1, false>>(1, 1, 1);
+  if (what == "pick") return bounded<MotionCost<PandaSetup, 2, true>>(2, 2, 3);
+  return nullptr;
+}
+
+}  // namespace engram::offline
