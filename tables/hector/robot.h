@@ -83,13 +83,14 @@ struct Hector {
     0x1.4p+2,  // back
     0x1.4p+2,  // right
   };
-  // least controls [N, N m]; tau = actuation u [-, m]
+  // least controls, if not -u_max
   static constexpr double u_lo[4] = {
     0.0,  // front
     0.0,  // left
     0.0,  // back
     0.0,  // right
   };
+  // tau = actuation u [-, m]
   static constexpr double actuation[6][4] = {
     {0.0, 0.0, 0.0, 0.0},  // root_joint x
     {0.0, 0.0, 0.0, 0.0},  // root_joint y

@@ -20,7 +20,7 @@ from engram.robots.tree import FREE, Tree, build, load, q_to_pin
 
 STATES = 1000
 TOLERANCE = 1e-10  # relative to the largest entry: rounding of 38 dofs, amplified by the condition of M in forward dynamics
-FRAME = {"panda": "hand_tcp", "talos": "left_gripper", "anymal": "lf_foot", "zoo": "tip"}
+FRAME = {"panda": "hand_tcp", "talos": "left_gripper", "anymal": "lf_foot", "ur10": "tool", "pr2": "left_tool", "zoo": "tip"}
 ROBOTS = ["panda", "talos"]  # compiled into the controller
 ZOO = Path(__file__).parent  # zoo/: joints of every kind about every sort of axis
 
@@ -28,25 +28,25 @@ ZOO = Path(__file__).parent  # zoo/: joints of every kind about every sort of ax
 class Case:
     """Random states of one robot, and what Pinocchio says about them."""
 
-    def __init__(self, tree: Tree):
+    def __init__(self, tree: Tree, n: int = STATES):
         self.tree, name = tree, tree.name
         rng = np.random.default_rng(7)
         lo, hi = np.maximum(tree.q_lo, -np.pi), np.minimum(tree.q_hi, np.pi)
-        self.q = rng.uniform(lo, hi, (STATES, tree.nq))
+        self.q = rng.uniform(lo, hi, (n, tree.nq))
         if tree.kind[0] == FREE:
-            self.q[:, 3:7] = rng.standard_normal((STATES, 4))
+            self.q[:, 3:7] = rng.standard_normal((n, 4))
             self.q[:, 3:7] /= np.linalg.norm(self.q[:, 3:7], axis=1, keepdims=True)
-        self.v, self.a = rng.standard_normal((2, STATES, tree.nv))
-        self.tau = 10.0 * rng.standard_normal((STATES, tree.nv))
+        self.v, self.a = rng.standard_normal((2, n, tree.nv))
+        self.tau = 10.0 * rng.standard_normal((n, tree.nv))
         model = tree.model
-        placement = frame_placement(tree, FRAME[name])
-        joint = int(tree.frame_joint[tree.frame_name.index(FRAME[name])]) + 1
+        placement = frame_placement(tree, FRAME.get(name, tree.frame_name[0]))
+        joint = int(tree.frame_joint[tree.frame_name.index(FRAME.get(name, tree.frame_name[0]))]) + 1
         frame = model.addFrame(pin.Frame("parity", joint, placement, pin.FrameType.OP_FRAME))
         data = model.createData()
-        self.crba = np.empty((STATES, tree.nv, tree.nv))
-        self.rnea, self.bias, self.aba = np.empty((3, STATES, tree.nv))
-        self.jacobian = np.empty((STATES, 6, tree.nv))
-        for i in range(STATES):
+        self.crba = np.empty((n, tree.nv, tree.nv))
+        self.rnea, self.bias, self.aba = np.empty((3, n, tree.nv))
+        self.jacobian = np.empty((n, 6, tree.nv))
+        for i in range(n):
             q = q_to_pin(tree, self.q[i])
             self.rnea[i] = pin.rnea(model, data, q, self.v[i], self.a[i])
             self.bias[i] = pin.nonLinearEffects(model, data, q, self.v[i])
@@ -118,7 +118,7 @@ def mujoco_dynamics(folder: Path, case: Case, model_file: Path) -> dict[str, np.
     bias, inverse, forward = (np.empty((n, nv)) for _ in range(3))
     error = ctypes.create_string_buffer(1000)
     pointers = [x.ctypes.data_as(ctypes.c_void_p) for x in (*inputs, M, bias, inverse, forward, jacobian)]
-    file, site = str(model_file).encode(), FRAME[tree.name].encode()
+    file, site = str(model_file).encode(), FRAME.get(tree.name, tree.frame_name[0]).encode()
     status = ctypes.CDLL(str(library)).mujoco_dynamics(file, site, n, tree.nq, nv, *pointers, error, 1000)
     assert status == 0, error.value.decode()
     return {

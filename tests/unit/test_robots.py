@@ -16,7 +16,7 @@ from engram.paths import ROOT
 from engram.robots.emit_header import c_double, robot_header
 from engram.robots.emit_mjcf import robot_mjcf
 from engram.robots.linear3 import principal_axes, turn_to
-from engram.robots.spec import read_spec
+from engram.robots.spec import known_robots, read_spec
 from engram.robots.tree import FREE, PRISMATIC, REVOLUTE, build, load, q_from_pin, q_to_pin
 
 ZOO = ROOT / "tests" / "reference" / "zoo"
@@ -163,7 +163,7 @@ def test_feet_stand_on_their_frames(models):
     assert tree.digest == build(read_spec("zoo", ZOO.parent)).digest  # feet concern the plant alone
 
 
-@pytest.mark.parametrize("name", ["panda", "talos", "anymal", "hector"])
+@pytest.mark.parametrize("name", known_robots())
 def test_committed_files_are_what_the_command_writes(name):
     tree = load(name)
     assert (ROOT / "tables" / name / "robot.h").read_text(encoding="utf-8") == robot_header(tree)
@@ -231,6 +231,13 @@ WRONG = {
     "two sources": ("free_base", 'example_robot_data = "panda"\nfree_base', r"exactly one of 'urdf'"),
     "unknown joint": ("welded = 0.7", "wheld = 0.7", r"robot\.toml:8: wheld: zoo\.urdf has no such joint; did you mean"),
     "unknown frame": ('"tip_link"', '"tap_link"', r"robot\.toml:15: tip: zoo\.urdf has no frame 'tap_link'; did you mean"),
+    "least force above": (
+        "u_max = 20.0",
+        "u_max = 20.0\nu_lo = 21.0",
+        r"robot\.toml:13: u_lo: the least force 21 of joint 'slider' is above",
+    ),
+    "key of another table": ("armature = 0.3", 'armature = "x"', r"robot\.toml:11: armature: expected numbers"),
+    "two bases": ("free_base", "planar_base = true\nfree_base", r"planar_base: a base is free or planar, not both"),
     "unknown joint key": ("u_max = 20.0", "umax = 20.0", r"robot\.toml:12: umax: unknown key; did you mean 'u_max'"),
     "home outside": ("oblique = 0.2", "oblique = 2.0", r"nominal posture 2 is outside its limits \[-0\.8, 0\.9\]"),
     "limits crossed": ("u_max = 20.0", "q_lo = 1.0", r"lower limit 1 is not below upper limit 0\.9"),

@@ -102,7 +102,8 @@ def robot_header(tree: Tree) -> str:
         *numbers("q_hi", tree.q_hi, coordinates),
         *numbers("v_max", tree.v_max, dofs),
         *numbers("u_max", tree.u_max, controls),
-        *(_thrusters(tree, controls, dofs) if tree.thruster_name else []),
+        *(["  // least controls, if not -u_max", *numbers("u_lo", tree.u_lo, controls)] if len(tree.u_lo) else []),
+        *(["  // tau = actuation u [-, m]", *numbers("actuation", tree.actuation, dofs)] if tree.thruster_name else []),
         *numbers("q_home", tree.q_home, coordinates),
         *numbers("gravity", tree.gravity, ["x (m/s^2)", "y", "z"]),
         "",
@@ -124,12 +125,3 @@ def robot_header(tree: Tree) -> str:
         f"#endif  // {guard}",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _thrusters(tree: Tree, controls: list[str], dofs: list[str]) -> list[str]:
-    """What replaces the defaults (controls from -u_max on, each driving one of the last nu dofs) if there are thrusters."""
-    return [
-        "  // least controls [N, N m]; tau = actuation u [-, m]",
-        *numbers("u_lo", tree.u_lo, controls),
-        *numbers("actuation", tree.actuation, dofs),
-    ]

@@ -53,9 +53,11 @@ def robot_mjcf(tree: Tree, visuals: list[Visual] = (), mesh_folder: str = "") ->
     for name, twist, lo, hi in zip(tree.thruster_name, tree.twist, tree.u_lo, tree.u_max):
         gear = words([0, 0, 1, 0, 0, twist])
         ElementTree.SubElement(actuator, "motor", name=name, site=name, gear=gear, ctrllimited="true", ctrlrange=words([lo, hi]))
-    for i, u_max in zip(moved, tree.u_max[len(tree.thruster_name) :]):
+    n = len(tree.thruster_name)
+    u_hi, u_lo = tree.u_max[n:], tree.u_lo[n:] if len(tree.u_lo) else -tree.u_max
+    for i, lo, hi in zip(moved, u_lo, u_hi):
         name = tree.joint_name[i]
-        ElementTree.SubElement(actuator, "motor", name=name, joint=name, ctrllimited="true", ctrlrange=words([-u_max, u_max]))
+        ElementTree.SubElement(actuator, "motor", name=name, joint=name, ctrllimited="true", ctrlrange=words([lo, hi]))
     keyframe = ElementTree.SubElement(root, "keyframe")
     ElementTree.SubElement(keyframe, "key", name="home", qpos=words(_qpos(tree)))
     ElementTree.indent(root)

@@ -10,8 +10,22 @@ from engram.paths import MODELS
 from engram.robots.linear3 import unit
 
 SOURCE_KEYS = ["example_robot_data", "urdf", "srdf"]
-KEYS = [*SOURCE_KEYS, "free_base", "home", "armature", "gravity", "locked", "joint", "frames", "spheres", "feet", "thruster"]
-JOINT_KEYS = ["armature", "q_lo", "q_hi", "v_max", "u_max"]
+KEYS = [
+    *SOURCE_KEYS,
+    "free_base",
+    "planar_base",
+    "home",
+    "armature",
+    "gravity",
+    "locked",
+    "joint",
+    "frames",
+    "spheres",
+    "feet",
+    "thruster",
+]
+JOINT_KEYS = ["armature", "q_lo", "q_hi", "v_max", "u_max", "u_lo"]
+PLANAR_BASE = ["base_x", "base_y", "base_yaw"]  # its joints: m, m, rad; world axes, then about the vertical
 THRUSTER_KEYS = ["link", "position", "axis", "twist", "u_lo", "u_hi"]
 
 
@@ -38,6 +52,7 @@ class RobotSpec:
     srdf: Path | None
     package_dirs: list[str]
     free_base: bool
+    planar_base: bool  # the whole robot rides on three more joints: PLANAR_BASE
     home: str | dict[str, float]
     armature: float
     gravity: np.ndarray  # (3) m/s^2, world axes
@@ -67,24 +82,29 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
         raise file.error("urdf", "give exactly one of 'urdf' (a path) and 'example_robot_data' (a name)")
     if not isinstance(data["free_base"], bool):
         raise file.error("free_base", "expected true or false")
-    for table in data.get("joint", {}).values():
-        file.check_keys(table, JOINT_KEYS)
-        for key, value in table.items():
-            file.numbers(key, value, ())
+    if not isinstance(data.get("planar_base", False), bool):
+        raise file.error("planar_base", "expected true or false")
+    if data["free_base"] and data.get("planar_base", False):
+        raise file.error("planar_base", "a base is free or planar, not both; set one of the two to false")
+    for joint, values in data.get("joint", {}).items():
+        table = f"joint.{joint}"
+        file.check_keys(values, JOINT_KEYS, table=table)
+        for key, value in values.items():
+            file.numbers(key, value, (), table)
     for key in ("locked", "home"):
         if isinstance(data.get(key), dict):
             for joint, value in data[key].items():
-                file.numbers(joint, value, ())
-    spheres = {link: file.numbers(link, rows, (-1, 4)) for link, rows in data.get("spheres", {}).items()}
+                file.numbers(joint, value, (), key)
+    spheres = {link: file.numbers(link, rows, (-1, 4), "spheres") for link, rows in data.get("spheres", {}).items()}
     for link, rows in spheres.items():
         if np.any(rows[:, 3] <= 0.0):
-            raise file.error(link, "a sphere's radius (fourth number) must be positive")
+            raise file.error(link, "a sphere's radius (fourth number) must be positive", "spheres")
     feet = {frame: np.atleast_1d(size) for frame, size in data.get("feet", {}).items()}
     for frame, size in feet.items():
         if frame not in data["frames"]:
-            raise file.error(frame, f"a foot stands on a named frame; {closest(frame, list(data['frames']))}")
-        if len(file.numbers(frame, size, (-1,))) not in (1, 3) or np.any(size <= 0.0):
-            raise file.error(frame, "a foot is a ball (its radius) or a box (three half sizes), all positive, in m")
+            raise file.error(frame, f"a foot stands on a named frame; {closest(frame, list(data['frames']))}", "feet")
+        if len(file.numbers(frame, size, (-1,), "feet")) not in (1, 3) or np.any(size <= 0.0):
+            raise file.error(frame, "a foot is a ball (its radius) or a box (three half sizes), all positive, in m", "feet")
     urdf, srdf, package_dirs = _sources(file)
     return RobotSpec(
         name=name,
@@ -93,6 +113,7 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
         srdf=srdf,
         package_dirs=package_dirs,
         free_base=data["free_base"],
+        planar_base=data.get("planar_base", False),
         home=data["home"],
         armature=float(file.numbers("armature", data.get("armature", 0.0), ())),
         gravity=file.numbers("gravity", data.get("gravity", [0.0, 0.0, -9.81]), (3,)),
@@ -105,18 +126,19 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
     )
 
 
-def _thruster(file: TomlFile, name: str, table: dict) -> Thruster:
+def _thruster(file: TomlFile, name: str, values: dict) -> Thruster:
     """One [thruster.<name>]."""
-    file.check_keys(table, THRUSTER_KEYS, required=THRUSTER_KEYS)
+    table = f"thruster.{name}"
+    file.check_keys(values, THRUSTER_KEYS, required=THRUSTER_KEYS, table=table)
     if not file.data["free_base"]:
         raise file.error(name, "a thruster needs free_base = true")
-    axis = file.numbers("axis", table["axis"], (3,))
+    position, axis = (file.numbers(key, values[key], (3,), table) for key in ("position", "axis"))
     if np.linalg.norm(axis) < 1e-6:
-        raise file.error("axis", f"the axis of thruster '{name}' must not be zero")
-    twist, u_lo, u_hi = (float(file.numbers(key, table[key], ())) for key in ("twist", "u_lo", "u_hi"))
+        raise file.error("axis", f"the axis of thruster '{name}' must not be zero", table)
+    twist, u_lo, u_hi = (float(file.numbers(key, values[key], (), table)) for key in ("twist", "u_lo", "u_hi"))
     if u_lo >= u_hi:
-        raise file.error("u_lo", f"thruster '{name}': the least thrust {u_lo:g} N is not below the largest {u_hi:g} N")
-    return Thruster(name, table["link"], file.numbers("position", table["position"], (3,)), unit(axis), twist, u_lo, u_hi)
+        raise file.error("u_lo", f"thruster '{name}': the least thrust {u_lo:g} N is not below the largest {u_hi:g} N", table)
+    return Thruster(name, values["link"], position, unit(axis), twist, u_lo, u_hi)
 
 
 def _sources(file: TomlFile) -> tuple[Path, Path | None, list[str]]:

@@ -16,9 +16,10 @@ import pinocchio as pin
 
 from engram.inputs import InputError, closest
 from engram.robots.linear3 import product, turn_to
-from engram.robots.spec import RobotSpec, read_spec
+from engram.robots.spec import PLANAR_BASE, RobotSpec, read_spec
 
 FREE, REVOLUTE, PRISMATIC = 0, 1, 2  # order of JointKind in controller/rbd/rbd_types.h
+CARRIAGE = 1e-6  # kg, kg m^2: bodies between the joints of a planar base, which MuJoCo would not take without mass
 NO_LIMIT = 1e8  # stands for an absent limit: finite, so that arithmetic on it stays finite
 
 
@@ -125,7 +126,8 @@ def build(spec: RobotSpec) -> Tree:
     frames = [_frame(spec, model, R_turn, name, link) for name, link in spec.frames.items()]
     p_BT, axis_B = _thrusters(spec, model)
     twist = np.array([t.twist for t in spec.thrusters])
-    joint_u_max = np.clip(model.effortLimit[6 if spec.free_base else 0 :], 0.0, NO_LIMIT)
+    joint_u_max, joint_u_lo = _joint_forces(spec, model)
+    one_sided = bool(spec.thrusters) or np.any(joint_u_lo != -joint_u_max)
     spheres = [(_frame(spec, model, R_turn, link, link), row) for link, rows in spec.spheres.items() for row in rows]
     tree = Tree(
         name=spec.name,
@@ -145,7 +147,7 @@ def build(spec: RobotSpec) -> Tree:
         q_hi=np.clip(q_hi, -NO_LIMIT, NO_LIMIT),
         v_max=np.clip(model.velocityLimit, 0.0, NO_LIMIT),
         u_max=np.concatenate([[t.u_hi for t in spec.thrusters], joint_u_max]),
-        u_lo=np.concatenate([[t.u_lo for t in spec.thrusters], -joint_u_max]) if spec.thrusters else np.zeros(0),
+        u_lo=np.concatenate([[t.u_lo for t in spec.thrusters], joint_u_lo]) if one_sided else np.zeros(0),
         actuation=_actuation(p_BT, axis_B, twist, model.nv) if spec.thrusters else np.zeros((0, 0)),
         q_home=np.zeros(len(q_lo)),
         gravity=spec.gravity,
@@ -190,13 +192,27 @@ def q_to_pin(tree: Tree, q: np.ndarray) -> np.ndarray:
     return q_pin
 
 
-def _load_model(spec: RobotSpec) -> tuple[pin.Model, np.ndarray]:
-    """The Pinocchio model with joints welded and overrides applied, and its nominal posture (Pinocchio's q)."""
+def full_model(spec: RobotSpec) -> pin.Model:
+    """The URDF with all its joints, on its base."""
     root = [pin.JointModelFreeFlyer()] if spec.free_base else []
     try:
         model = pin.buildModelFromUrdf(str(spec.urdf), *root)
     except (ValueError, RuntimeError) as error:
         raise InputError(f"{spec.urdf}: Pinocchio cannot read this URDF ({error}); mend the file") from None
+    if not spec.planar_base:
+        return model
+    carriage, parent = pin.Model(), 0
+    for name, joint in zip(PLANAR_BASE, (pin.JointModelPX(), pin.JointModelPY(), pin.JointModelRZ())):
+        far = np.full(1, NO_LIMIT)
+        parent = carriage.addJoint(parent, joint, pin.SE3.Identity(), name, far, far, -far, far)
+        carriage.appendBodyToJoint(parent, pin.Inertia(CARRIAGE, np.zeros(3), CARRIAGE * np.eye(3)), pin.SE3.Identity())
+        carriage.addJointFrame(parent)
+    return pin.appendModel(carriage, model, carriage.getFrameId(PLANAR_BASE[-1]), pin.SE3.Identity())
+
+
+def _load_model(spec: RobotSpec) -> tuple[pin.Model, np.ndarray]:
+    """The Pinocchio model with joints welded and overrides applied, and its nominal posture (Pinocchio's q)."""
+    model = full_model(spec)
     home = pin.neutral(model)
     if isinstance(spec.home, str):
         if spec.srdf is None:
@@ -211,7 +227,7 @@ def _load_model(spec: RobotSpec) -> tuple[pin.Model, np.ndarray]:
     _put(spec, model, weld, spec.locked)
     model = pin.buildReducedModel(model, [model.getJointId(joint) for joint in spec.locked], weld)
     kept = pin.neutral(model)
-    reference = pin.buildModelFromUrdf(str(spec.urdf), *root)
+    reference = full_model(spec)
     for name, joint in zip(list(model.names)[1:], model.joints[1:]):
         full = reference.joints[reference.getJointId(name)]
         kept[joint.idx_q : joint.idx_q + joint.nq] = home[full.idx_q : full.idx_q + full.nq]
@@ -247,6 +263,20 @@ def _override(spec: RobotSpec, model: pin.Model) -> None:
             "u_max": (model.effortLimit, joint.idx_v),
         }.items():
             array[i] = values.get(key, array[i])
+
+
+def _joint_forces(spec: RobotSpec, model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
+    """Largest and least forces of the joints; the least is -u_max unless robot.toml says otherwise."""
+    u_max = np.clip(model.effortLimit, 0.0, NO_LIMIT)
+    u_lo = -u_max
+    for name, values in spec.joint.items():
+        i = model.joints[_joint_id(spec, model, name)].idx_v
+        u_lo[i] = values.get("u_lo", u_lo[i])
+        if u_lo[i] > u_max[i]:
+            what = f"the least force {u_lo[i]:g} of joint '{name}' is above the largest, {u_max[i]:g}; exchange or mend them"
+            raise spec.file.error("u_lo", what, f"joint.{name}")
+    base = 6 if spec.free_base else 0
+    return u_max[base:], u_lo[base:]
 
 
 def _classify(spec: RobotSpec, model: pin.Model, name: str, joint: pin.JointModel) -> tuple[int, bool, np.ndarray | None]:

@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from engram.robots.spec import RobotSpec
-from engram.robots.tree import Tree
+from engram.robots.tree import Tree, full_model
 
 SMALL_PART = 100  # triangles; smaller parts take the colour of the link's largest (MuJoCo refuses flat meshes)
 CELL = 0.006  # m, of the grid in which vertices are merged: a pixel of the video; software rendering takes half the time
@@ -38,8 +38,7 @@ class Visual:
 
 def load_visuals(spec: RobotSpec, tree: Tree) -> list[Visual]:
     """All visual shapes of the URDF, placed in the joint frames of `tree`."""
-    root = [pin.JointModelFreeFlyer()] if spec.free_base else []
-    model = pin.buildModelFromUrdf(str(spec.urdf), *root)
+    model = full_model(spec)
     geometry = pin.buildGeomFromUrdf(model, str(spec.urdf), pin.GeometryType.VISUAL, package_dirs=spec.package_dirs)
     visuals = []
     for shape in geometry.geometryObjects:
