@@ -30,6 +30,8 @@ inline const char* words(FddpStatus status) {
       return "not positive definite";
     case FddpStatus::kNotFinite:
       return "not finite";
+    case FddpStatus::kBadHorizon:
+      return "bad horizon";
   }
   return "unknown";
 }

@@ -22,6 +22,15 @@ enum class FddpStatus : int32_t {
   kDeadline,             // time budget spent; the solution is the best iterate
   kNotPositiveDefinite,  // no descent direction up to the largest regularization; the solution is the last iterate
   kNotFinite,            // guess, parameters or derivatives are not finite; the solution is unchanged
+  kBadHorizon,           // fddp_check refuses the horizon; the solution is unchanged
+};
+
+// Threads that the caller keeps outside the control period: run() calls task(context, i) for i = 0 .. threads - 1, side by side, and
+// returns when all are done. Results are the same bits whatever their number.
+struct FddpThreads {
+  int threads = 1;
+  void (*run)(void* self, void (*task)(void* context, int thread), void* context) = nullptr;
+  void* self = nullptr;
 };
 
 struct FddpOpts {
@@ -41,6 +50,7 @@ struct FddpOpts {
   double gap_zero = 1e-16;         // gaps below this count as closed
   double (*now_us)() = nullptr;    // clock for phase times and the deadline; null: neither
   double budget_us = 0.0;          // time budget from the start of the solve; 0: none
+  FddpThreads threads = {};        // for the linearization; those beyond the first need FddpWork::more_lanes
 
   double now() const { return now_us ? now_us() : 0.0; }
 };
@@ -77,6 +87,21 @@ template <class P, int N> struct Horizon {
   unsigned phase_of(int k) const { return k == n ? kTerminalPhase : phase[k]; }
 };
 
+// What is wrong with a horizon, if anything.
+struct FddpHorizonError {
+  const char* text = nullptr;  // null: nothing
+  int knot = 0;
+};
+template <class P, int N> FddpHorizonError fddp_check(const Horizon<P, N>& h) {
+  if (h.n < 0) return {"a horizon of fewer than 0 knots; count them again", 0};
+  if (h.n > N) return {"a horizon longer than the compile-time maximum; shorten it, or raise N of Horizon, FddpWork, FddpSolution", N};
+  for (int k = 0; k < h.n; ++k) {
+    const bool impact = P::kPhases && (h.phase[k] & kImpactPhase) != 0;
+    if (!impact && !(h.knot[k].dt > 0.0)) return {"a phase of no length; give the knot dt > 0, or leave it out", k};
+  }
+  return {};
+}
+
 template <class P, int N> struct FddpSolution {
   static constexpr int nxp = P::Layout::nxp;
   double x[N + 1][P::nx];                 // states
@@ -108,6 +133,7 @@ template <class P, int N> struct FddpWork {
   double reg;
   // scratch
   typename P::Lanes lanes;
+  typename P::Lanes* more_lanes = nullptr;  // the caller's, one for each thread beyond the first
   alignas(64) double Q[L::nzp][L::nzp], Qz[L::nzp];
   alignas(64) double Vxx[L::nxp][L::nxp], Vx[L::nxp];
   alignas(64) double Vvq[P::nv][padded(P::nv)], Vvv[P::nv][padded(P::nv)], Vqq[P::nv][padded(P::nv)];

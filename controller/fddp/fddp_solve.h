@@ -43,7 +43,7 @@ FddpStatus fddp_direction(const Horizon<P, N>& h, const FddpOpts& opts, bool rel
                           FddpStats& stats) {
   if (relinearize) {
     FddpTimer timer(opts, stats.us[kLinearize]);
-    if (!fddp_linearize(h, s, w)) return FddpStatus::kNotFinite;
+    if (!fddp_linearize(h, s, w, opts.threads)) return FddpStatus::kNotFinite;
     if (!w.feasible && w.largest_gap < opts.gap_zero) w.feasible = true;
     s.cost = w.cost;
   }
@@ -102,6 +102,7 @@ FddpStatus fddp_solve(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, 
   const double start = opts.now();
   double slowest = 0.0;  // iteration so far, us
   fddp_start(opts, w, stats);
+  if (fddp_check(h).text) return stats.status = FddpStatus::kBadHorizon;
   bool relinearize = true;
   for (int i = 0; i < opts.iterations; ++i) {
     const double begin = opts.now();

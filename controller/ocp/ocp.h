@@ -50,6 +50,11 @@ template <class R_, class... Terms> struct Ocp {
     for (int i = 0; i < nv; ++i) dx[Layout::ov + i] = x1[nq + i] - x0[nq + i];
   }
 
+  // Calls f(parameters, residual) for each constraint of a knot.
+  template <class F> static void visit_constraints(Knot<double>& knot, const double* x, const double* u, F f) {
+    engram::visit_constraints<R, Knot<double>, F, Terms...>(knot, x, u, f);
+  }
+
   // Next state and cost of a knot.
   template <class S> static void calc(const Knot<S>& knot, const S* x, const S* u, S* x_next, S& cost) {
     RbdData<R, S> d;

@@ -18,7 +18,7 @@
 
 namespace engram {
 
-inline constexpr unsigned kImpact = 1u << 31;
+inline constexpr unsigned kImpact = kImpactPhase;
 
 template <class Term, class = void> inline constexpr bool kIsForceTerm = false;
 template <class Term> inline constexpr bool kIsForceTerm<Term, std::void_t<decltype(Term::kContact)>> = true;
@@ -63,6 +63,11 @@ template <class C, class... Terms> struct ContactOcp {
     for (int i = 0; i < Layout::nxp; ++i) dx[i] = 0.0;
     rbd_difference<R>(x0, x1, dx + Layout::oq);
     for (int i = 0; i < nv; ++i) dx[Layout::ov + i] = x1[nq + i] - x0[nq + i];
+  }
+
+  // Calls f(parameters, residual) for each constraint of a knot.
+  template <class F> static void visit_constraints(Knot<double>& knot, const double* x, const double* u, F f) {
+    engram::visit_constraints<R, Knot<double>, F, Terms...>(knot, x, u, f);
   }
 
   // Next state and cost of a knot.

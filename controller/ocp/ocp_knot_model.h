@@ -25,6 +25,8 @@ constexpr int padded(int n) { return (n + kVector - 1) / kVector * kVector; }
 
 // The phase of the terminal knot, in problems with phases.
 inline constexpr unsigned kTerminalPhase = 1u << 30;
+// Bit of a phase that takes no time: an impact.
+inline constexpr unsigned kImpactPhase = 1u << 31;
 
 // Sizes and offsets of z = (q, v, u) for nv velocities and nu controls.
 template <int nv_, int nu_> struct KnotLayout {

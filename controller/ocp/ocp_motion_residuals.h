@@ -1,4 +1,4 @@
-// Residuals of motion: rotation and velocity of a frame, centroidal momentum. To be used in a ResidualTerm.
+// Residuals of motion: state, position, rotation and velocity of a frame, centroidal momentum. To be used in a ResidualTerm.
 //
 // Along dof k of joint j, with parent velocity V_p and spatial quantities at the world origin, the tree beyond k turns with J_k:
 //   dV_i/dq_k = J_k x (V_i - V_p)                  seen from axes that move with body i: V_p x J_k
@@ -12,6 +12,60 @@
 #include "controller/rbd/rbd_manifold.h"
 
 namespace engram {
+
+// x (-) x*, of a fixed base: a vector.
+template <class R> struct State {
+  static_assert(!kFreeBase<R>, "of a free base: StateTerm, StateBoundTerm");
+  using Robot = R;
+  static constexpr int rows = 2 * R::nv;
+  static constexpr bool kOfVelocity = true;
+  static constexpr AllDofs<R> path{};
+  template <class S> struct Reference {
+    S x[2 * R::nv];
+  };
+
+  template <class S> static void value(const Reference<S>& ref, const KnotView<R, S>& k, S (&r)[rows]) {
+    for (int i = 0; i < R::nv; ++i) {
+      r[i] = k.q[i] - ref.x[i];
+      r[R::nv + i] = k.v[i] - ref.x[R::nv + i];
+    }
+  }
+  template <class S> static void jacobian(const Reference<S>&, const KnotView<R, S>&, S (&J)[rows][2 * R::nv]) {
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j < rows; ++j) J[i][j] = i == j ? 1.0 : 0.0;
+  }
+};
+
+// p_WF - p*
+template <class R, int frame> struct FrameTranslation {
+  using Robot = R;
+  static constexpr int rows = 3;
+  static constexpr bool kOfVelocity = false;
+  static constexpr DofPath<R> path{R::frame_joint[frame]};
+  template <class S> struct Reference {
+    S p[3];  // p* [m], world axes
+  };
+
+  template <class S> static void value(const Reference<S>& ref, const KnotView<R, S>& k, S (&r)[rows]) {
+    const Vec3<S> p_WF = at(k);
+    for (int i = 0; i < 3; ++i) r[i] = p_WF[i] - ref.p[i];
+  }
+  template <class S> static void jacobian(const Reference<S>&, const KnotView<R, S>& k, S (&J)[rows][2 * R::nv]) {
+    const Vec3<S> p_WF = at(k);
+    for (int a = 0; a < path.n; ++a) {
+      const Motion<S> column = moved_to(k.d.J[path.dof[a]], p_WF);
+      for (int i = 0; i < 3; ++i) J[i][a] = column.lin[i];
+    }
+  }
+
+ private:
+  template <class S> static Vec3<S> at(const KnotView<R, S>& k) {
+    Mat3<S> R_WF;
+    Vec3<S> p_WF;
+    rbd_frame_placement<R>(k.d, frame, R_WF, p_WF);
+    return p_WF;
+  }
+};
 
 // log3(R*' R_WF)
 template <class R, int frame> struct FrameRotation {

@@ -14,6 +14,7 @@
 
 #include "controller/ocp/ocp_activation.h"
 #include "controller/ocp/ocp_view.h"
+#include "controller/rbd/rbd_crba.h"
 
 #include <type_traits>
 
@@ -45,6 +46,8 @@ template <class F, template <int> class Activation = Weighted> struct ResidualTe
   template <class S> struct Param : A::template Param<S> {
     typename F::template Reference<S> ref;
   };
+
+  template <class S> static void residual(const Param<S>& p, const KnotView<R, S>& k, S (&r)[rows]) { F::value(p.ref, k, r); }
 
   template <class S> static S cost(const Param<S>& p, const KnotView<R, S>& k) {
     S r[rows], w[rows];
@@ -83,6 +86,31 @@ template <class F, template <int> class Activation = Weighted> struct ResidualTe
     return weighted_square(r, w);
   }
 };
+
+// True if a term holds a constraint by multipliers.
+template <class Term, class = void> inline constexpr bool kHasMultipliers = false;
+template <class Term> inline constexpr bool kHasMultipliers<Term, std::void_t<decltype(Term::A::kHasMultipliers)>> = true;
+
+// Calls f(parameters, residual) for each of the terms that holds a constraint, at a state.
+template <class R, class Knot, class F, class... Terms> void visit_constraints(Knot& knot, const double* x, const double* u, F f) {
+  if constexpr ((kHasMultipliers<Terms> || ...)) {
+    RbdData<R, double> d;
+    rbd_kinematics(x, d);
+    rbd_velocity(x + R::nq, d);
+    rbd_inertias(d);
+    rbd_composite_inertias(d);
+    const KnotView<R, double> view{x, x + R::nq, u, d, nullptr, nullptr};
+    const auto visit = [&](auto* term) {
+      using Term = std::remove_pointer_t<decltype(term)>;
+      if constexpr (kHasMultipliers<Term>) {
+        double r[Term::rows];
+        Term::residual(param_of<Term>(knot), view, r);
+        f(param_of<Term>(knot), r);
+      }
+    };
+    (visit(static_cast<Terms*>(nullptr)), ...);
+  }
+}
 
 }  // namespace engram
 #endif  // CONTROLLER_OCP_OCP_RESIDUAL_H_
