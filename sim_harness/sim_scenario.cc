@@ -122,7 +122,7 @@ std::string Referee::reason(const Trial& trial, const TrialRecord& r) {
   add(r.fallen, "fall");
   add(trial.drift.asked() && !(r.drift <= trial.drift.bound), "drift");
   add(trial.height.asked() && !(r.height_rms() <= trial.height.bound), "height");
-  add(trial.pace.asked() && (r.fallen || off_pace()), "pace");
+  add(trial.pace.asked() && !r.fallen && off_pace(), "pace");
   add(r.torque_share > 1 + kTorqueTolerance || r.joint_excess > kJointTolerance, "limit");
   return text.empty() ? "ok" : text;
 }

@@ -88,7 +88,7 @@ template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
   }
   if (taken_ != task_.utime) {
     taken_ = task_.utime;
-    model_.take(utime, task_.target);
+    model_.take(task_.utime, task_.target);
   }
   const double posing = deadline.now();
   knot_times<N>(utime, origin_, M::kStepUs, utime_);

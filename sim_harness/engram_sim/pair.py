@@ -14,7 +14,7 @@ from engram.inputs import InputError
 from engram.paths import BUILD, TABLES, relative
 
 FIRST_PORT, PORTS = 20000, 20000
-JUMP_LINE = re.compile(r"jump (\d+)/(\d+) (\S+) ([\d.]+) s")
+PART_LINE = re.compile(r"(?:jump|episode) (\d+)/(\d+) (\S+) ([\d.]+) s")
 STOP_TIME = 5.0  # s that a controller has to end after SIGTERM
 
 
@@ -50,23 +50,33 @@ class Pair:
     """
 
     folder: Path
-    series: Path
+    script: Path
     scene: Path
     port: int
     mode: str = "memory"
+    model: str = "panda_reach"
+    kind: str = "series"  # of the script: series or scenario
     controller: Path | None = None  # default: engram-controller of the build
     controller_options: list[str] = field(default_factory=list)
     plant_options: list[str] = field(default_factory=list)
     clock: str = "lockstep"
 
     def run(self, progress: Callable[[int, int, str, float], None] | None = None) -> int:
-        """Run to the end; the exit code of the plant. `progress(jump, jumps, outcome, seconds)` is called after each jump."""
+        """Run to the end; the exit code of the plant. `progress(part, parts, outcome, seconds)` hears of each jump or episode."""
         self.folder.mkdir(parents=True, exist_ok=True)
         url = lcm_url(self.port)
         controller_call = [str(self.controller or program("engram-controller")), "--lcm-url", url, "--clock", self.clock]
-        controller_call += ["--memory", self.mode, "--jumps", str(self.folder / "jumps.csv"), *self.controller_options]
+        controller_call += [
+            "--model",
+            self.model,
+            "--memory",
+            self.mode,
+            "--jumps",
+            str(self.folder / "jumps.csv"),
+            *self.controller_options,
+        ]
         plant_call = [str(program("engram-plant")), "--lcm-url", url, "--clock", self.clock, "--scene", str(self.scene)]
-        plant_call += ["--series", str(self.series), "--log", str(self.folder / "run.lcm")]
+        plant_call += [f"--{self.kind}", str(self.script), "--log", str(self.folder / "run.lcm")]
         plant_call += ["--results", str(self.folder / "results.json"), "--timing", str(self.folder / "timing.csv")]
         plant_call += self.plant_options
         calls = {"controller": controller_call, "plant": plant_call}
@@ -82,7 +92,7 @@ class Pair:
             plant = subprocess.Popen(plant_call, stdout=subprocess.PIPE, stderr=plant_said, stdin=subprocess.DEVNULL, text=True)
             try:
                 for line in plant.stdout:
-                    found = JUMP_LINE.match(line)
+                    found = PART_LINE.match(line)
                     if found and progress:
                         progress(int(found[1]), int(found[2]), found[3], float(found[4]))
                 return plant.wait()

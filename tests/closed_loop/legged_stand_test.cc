@@ -48,7 +48,7 @@ TEST_F(StandTest, HoldsUntilItsFirstTaskThenStandsStill) {
 }
 
 TEST_F(StandTest, SquatsAsAsked) {
-  constexpr double kDepth = 0.2, kRate = 0.5, kTask = 0.11;  // m, Hz, s: first tick of the task
+  constexpr double kDepth = 0.2, kRate = 0.5, kTask = 0.1;  // m, Hz, s
   LeggedPlant plant(kModel, M_PI / 2);
   LeggedController c(kModel);
   run(plant, c, 100, [](double) {});

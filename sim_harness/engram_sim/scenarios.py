@@ -1,0 +1,131 @@
+"""What each motion is demonstrated by, as a script for engram-plant (formats: sim_harness/sim_scenario.h, sim_series.h).
+
+The same seed gives the same bytes. A script's parts are its episodes, or its way points.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from engram.inputs import InputError, closest
+from engram.tasks.motion import MotionSpec
+from engram_sim.series import HELD_OUT, numbers
+
+YAWS = (0.0, 90.0, 180.0, 270.0)  # deg
+PUSH_TIME = 0.1  # s, a push lasts
+
+
+@dataclass
+class Script:
+    """A run of the plant: `kind` is its option, --series or --scenario."""
+
+    kind: str
+    lines: list[str]
+    parts: int
+    site: str  # of the robot, whose way the video draws
+    plant_options: list[str] = field(default_factory=list)
+
+    def write(self, path: Path) -> None:
+        path.write_text("\n".join(self.lines) + "\n", encoding="utf-8")
+
+
+def header(spec: MotionSpec, kind: str, seed: int) -> list[str]:
+    """First lines of a script."""
+    digests = [f"robot_digest 0x{spec.robot.digest:016x}", f"task_digest 0x{spec.digest:016x}"]
+    return [f"engram_{kind} 1", f"# seed {seed}: {spec.robot.name} {spec.name}", *digests]
+
+
+def home(spec: MotionSpec, yaw: float) -> str:
+    """The nominal posture, turned about the vertical by `yaw` (deg)."""
+    q, half = spec.robot.q_home.copy(), np.radians(yaw) / 2.0
+    q[3:7] = [0.0, 0.0, np.sin(half), np.cos(half)]
+    return f"state {numbers(q)}"
+
+
+def push(t: float, body: str, impulse: float, direction: float) -> str:
+    """A push of `impulse` (N s) at t (s) along `direction` (deg about the vertical, world axes)."""
+    angle = np.radians(direction)
+    return f"push {t!r} {PUSH_TIME!r} {body} {numbers(impulse / PUSH_TIME * np.array([np.cos(angle), np.sin(angle), 0.0]))}"
+
+
+def talos_stand(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """Standing for a minute, squats, and pushes on the torso from four sides at four headings."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    upright = "upright 0.6 0.7"
+    episodes = [
+        ["episode stand 60", home(spec, 0.0), "task 0 0 0 0", upright, "drift 5 0.001"],
+        ["episode squat 20", home(spec, 0.0), "task 0 0 0.2 0.5", upright, "height 2 0.01  0 0.2 0.5"],
+    ]
+    for yaw in YAWS:
+        for side, impulse, about in (("+x", 20.0, 0.0), ("-x", 24.0, 180.0), ("+y", 28.0, 90.0), ("-y", 28.0, 270.0)):
+            t = round(float(rng.uniform(1.5, 2.0)), 3)
+            name = f"push_{side}_{impulse:.0f}Ns_at_{yaw:.0f}deg"
+            blow = push(t, "torso_2_joint", impulse, about + yaw)
+            episodes.append([f"episode {name} 6", home(spec, yaw), "task 0 0 0 0", blow, upright])
+    return scenario(spec, seed, episodes[:parts], "torso")
+
+
+def anymal_trot(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """Standing, trotting in place and forward for a minute, and lateral pushes at random phases of the gait."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    upright, settle = "upright 0.25 0.6", 3.0
+    episodes = [
+        ["episode stand 10", home(spec, 0.0), "task 0 0 0 0 0", upright, "drift 5 0.001"],
+        ["episode trot_in_place 20", home(spec, 0.0), "task 0 0 0 0 1", upright, f"pace {settle} 0.03  0 0 0"],
+    ]
+    for speed in (0.3, 0.6):
+        name = f"trot_{speed:.1f}"
+        bound = f"pace {settle} 0.05  {speed} 0 0"
+        episodes.append([f"episode {name} 60", home(spec, 0.0), f"task 0 {speed} 0 0 1", upright, bound])
+    for n, impulse in enumerate([15.0] * 8):
+        yaw, side = YAWS[n % 4], (90.0, 270.0)[n // 4 % 2]
+        t = round(float(rng.uniform(3.0, 3.5)), 3)  # a random phase of the gait
+        name = f"push_{'+y' if side == 90.0 else '-y'}_{impulse:.0f}Ns_at_{yaw:.0f}deg"
+        blow = push(t, "root_joint", impulse, side + yaw)
+        episodes.append([f"episode {name} 7", home(spec, yaw), "task 0 0.3 0 0 1", blow, upright])
+    return scenario(spec, seed, episodes[:parts], "base")
+
+
+def scenario(spec: MotionSpec, seed: int, episodes: list[list[str]], site: str) -> Script:
+    """A script of episodes."""
+    return Script(
+        "scenario", header(spec, "scenario", seed) + [line for lines in episodes for line in lines], len(episodes), site
+    )
+
+
+def hector_fly(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """Random way points with random headings, in gusts of wind; integrated by CVODES."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    points = parts or 50
+    success = {key: float(spec.constants[f"success_{key}"]) for key in ("position", "rotation", "time")}
+    lines = header(spec, "series", seed)
+    lines += [
+        "hand base",
+        f"window {success['time']!r}",
+        "hold 0.3",
+        f"tolerance {success['position']!r} {success['rotation']!r}",
+    ]
+    lines.append(f"episode {numbers([0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])}")
+    for _ in range(points):
+        p, yaw = rng.uniform([-2.0, -2.0, 0.5], [2.0, 2.0, 3.0]), rng.uniform(-3.0, 3.0)
+        pose = [*p, 0.0, 0.0, np.sin(yaw / 2.0), np.cos(yaw / 2.0)]
+        lines.append(f"jump {numbers(pose)}  {numbers([*p, yaw])}")
+    wind = ["--gust-period", "1", "--gust-force", "3", "--gust-duration", "1"]
+    return Script("series", lines, points, "base", ["--engine", "cvode", *wind, "--seed", str(seed)])
+
+
+MOTIONS: dict[str, Callable[[MotionSpec, int, int | None], Script]] = {
+    "talos_stand": talos_stand,
+    "anymal_trot": anymal_trot,
+    "hector_fly": hector_fly,
+}
+
+
+def script(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """The script of a motion; its first `parts` parts, or all. Raises InputError."""
+    name = f"{spec.robot.name}_{spec.name}"
+    if name not in MOTIONS:
+        raise InputError(f"no demo is written for '{name}'; {closest(name, list(MOTIONS))}; write one in {Path(__file__).name}")
+    return MOTIONS[name](spec, seed, parts)
