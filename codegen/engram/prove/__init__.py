@@ -1,0 +1,1 @@
+"""Proofs of robots on legs: closed loops of the compiled controller, many of them, and what they show."""
