@@ -19,6 +19,7 @@
 #include "controller/rbd/rbd_frames.h"
 #include "controller/rbd/rbd_manifold.h"
 
+#include <cmath>
 #include <type_traits>
 
 namespace engram {
@@ -110,8 +111,12 @@ inline void rbd_contact_jacobians(const RbdData<R, S>& d, unsigned active, Conta
   }
 }
 
-// cd.U and the Cholesky factor of cd.G. After rbd_factor and rbd_contact_jacobians. A singular set of contacts (more constraints than
-// its paths can hold) leaves values that are not finite.
+// A pivot of G below this share of its diagonal entry is rounding: the contacts ask for the same motion twice, or for one that their
+// paths cannot make.
+inline constexpr double kSingularContact = 1e-13;
+
+// cd.U and the Cholesky factor of cd.G. After rbd_factor and rbd_contact_jacobians. A singular set of contacts leaves NaN, from which
+// the solver makes a status.
 template <class C, class R, class S>
 inline void rbd_contact_factor(const RbdData<R, S>& d, unsigned active, ContactData<C, S>& cd) {
   constexpr const ContactTree<C>& tree = kContactTree<C>;
@@ -144,8 +149,9 @@ inline void rbd_contact_factor(const RbdData<R, S>& d, unsigned active, ContactD
   for (int J = 0; J < rows.n; ++J) {
     const int j = rows.row[J];
     S diagonal = cd.G[j][j];
+    const S least = S(kSingularContact) * diagonal;
     for (int K = 0; K < J; ++K) diagonal = nmadd(cd.G[j][rows.row[K]], cd.G[j][rows.row[K]], diagonal);
-    cd.G_inv[j] = 1.0 / sqrt(diagonal);
+    cd.G_inv[j] = select(diagonal > least, 1.0 / sqrt(diagonal), S(NAN));
     for (int I = J + 1; I < rows.n; ++I) {
       const int i = rows.row[I];
       S g = cd.G[i][j];

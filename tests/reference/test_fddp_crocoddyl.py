@@ -1,5 +1,7 @@
 """FDDP beside Crocoddyl's on its arm example: model of a knot, direction, and the way to the optimum."""
 
+import ctypes
+
 import crocoddyl
 import numpy as np
 import pinocchio as pin
@@ -110,6 +112,31 @@ def test_way_to_the_optimum(both):
     assert abs(solution["iterations"] - (solver.iter + 1)) <= ITERATION_TOLERANCE
     # the optimum is where the gradient vanishes: states agree to about the root of the cost's tolerance
     np.testing.assert_allclose(solution["xs"], np.array(solver.xs), atol=1e-4)
+
+
+def test_box_of_the_controls(build):
+    """Projected Newton beside SolverBoxFDDP on motors so weak that torques saturate: same optimum, same bounds active."""
+    library = build / "tests" / "libbox_oracle.so"
+    assert library.is_file(), f"{library} is missing: ninja -C {build} box_oracle"
+    T = 30
+    us, limit, cost, iterations = np.empty((T, 7)), np.empty(7), ctypes.c_double(), ctypes.c_int()
+    arrays = [a.ctypes.data_as(ctypes.c_void_p) for a in (us, limit)]
+    assert ctypes.CDLL(str(library)).box_arm(ctypes.c_double(STOP), *arrays, ctypes.byref(cost), ctypes.byref(iterations)) == 0
+    peer = peer_problem(T)
+    for model in peer.runningModels:
+        model.u_lb, model.u_ub = -limit, limit
+    start = engine.Arm(T).cold_start()
+    solver = crocoddyl.SolverBoxFDDP(peer)
+    solver.th_stop = STOP
+    assert solver.solve(list(start["xs"]), list(start["us"]), 200, False)
+    theirs = np.array(solver.us)
+    bound = np.abs(us) == limit
+    counts = f"iterations {iterations.value} and {solver.iter + 1}, {bound.sum()} controls at a bound"
+    print(f"cost {cost.value:.9f} and {solver.cost:.9f}, {counts}")
+    assert abs(cost.value - solver.cost) <= COST_TOLERANCE * solver.cost
+    assert np.all(np.abs(us) <= limit) and bound.sum() > T
+    np.testing.assert_allclose(us, theirs, atol=1e-3)  # N m: the root of the cost's tolerance over the weight of u
+    assert np.array_equal(bound, np.abs(theirs) >= limit - 1e-9)
 
 
 def test_direction_solves_the_kkt_system():
