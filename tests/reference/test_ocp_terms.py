@@ -141,7 +141,7 @@ def peer_terms() -> dict[str, tuple[np.ndarray, object, object]]:
         barrier(lo, -lo),
     )
     c = np.array([0.1, 0.2, 0.3])
-    cases["com"] = (np.r_[2.0, c], residual.ResidualModelCoMPosition(state, c, nu), weighted(3, 2.0))
+    cases["com"] = (np.r_[2.0, 2.0, 2.0, c], residual.ResidualModelCoMPosition(state, c, nu), weighted(3, 2.0))
     cases["placement"] = (
         np.r_[2.0, PLACEMENT.translation, PLACEMENT.rotation.ravel()],
         residual.ResidualModelFramePlacement(state, frame["RF"], PLACEMENT, nu),
@@ -169,7 +169,7 @@ def peer_terms() -> dict[str, tuple[np.ndarray, object, object]]:
     mu = 0.6
     wrench = crocoddyl.WrenchCone(np.eye(3), mu, size, 4, False, 0.0, np.inf)
     cases["wrench_cone"] = (
-        np.r_[BARRIER_WEIGHT, mu, 0.5 * size],
+        np.r_[BARRIER_WEIGHT, mu, 0.5 * size, 1.0, 0.0],
         residual.ResidualModelContactWrenchCone(state, frame["LF"], wrench, nu),
         barrier(wrench.lb, wrench.ub),
     )
