@@ -7,7 +7,7 @@ it can: that map has many modes. Controls: nothing at all, straight lines, rando
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from engram.learn.mixture import Conditional, condition, fit_bayesian, fit_gauss
 from engram.learn.network import Network, fit_density, fit_ensemble
 
 ANSWERS = 8  # asked of every learner, as many as the memory has neighbours
+SMALLER = ("bgmr", "mdn")  # learners that compete with int8 storage as well: what it costs is measured
 RANDOM = 8  # postures of the uniform control
 
 
@@ -130,6 +131,8 @@ def learners(
         learner = from_table(name, make(), nq, m)
         control = smaller(memory.knn, learner.bytes)
         made += [learner, from_table(f"{name}.knn_at_bytes", control, nq, m, control=True)]
+        if name in SMALLER:
+            made.append(from_table(f"{name}.int8", replace(learner.tables[0], type="int8"), nq, m))
     return made
 
 
