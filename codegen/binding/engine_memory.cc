@@ -79,7 +79,8 @@ template <class Task> class Memory {
     if (memory_check<Task>(tables_, text) != kTabOk) throw nb::value_error(text);
   }
 
-  nb::dict query(const In<1>& x0, const In<1>& task, int neighbours, bool regression, int lines, double max_warp) {
+  nb::dict query(const In<1>& x0, const In<1>& task, int neighbours, bool regression, int lines, double max_warp,
+                 bool recall_controls) {
     check_shape<1>("x0", x0, {nx});
     check_shape<1>("task", task, {Task::ntask});
     ReachTarget target;
@@ -91,6 +92,7 @@ template <class Task> class Memory {
     opts.regression = regression;
     opts.lines = lines;
     opts.max_warp = max_warp;
+    opts.recall_controls = recall_controls;
     double t[N + 1];
     for (int k = 0; k <= N; ++k) t[k] = k * Task::dt;
     {
@@ -143,7 +145,7 @@ template <class Task> void bind_task_memory(nb::module_& engine, const char* nam
       .def(nb::init<const nb::object&, const nb::object&, const nb::object&, const nb::object&, const nb::object&>(), "knn"_a,
            "gpr"_a, "bow"_a, "time"_a, "trust"_a)
       .def("query", &M::query, "x0"_a, "task"_a, "neighbours"_a = kMemoryNeighbours, "regression"_a = true,
-           "lines"_a = kMemoryLines, "max_warp"_a = MemoryOpts{}.max_warp,
+           "lines"_a = kMemoryLines, "max_warp"_a = MemoryOpts{}.max_warp, "recall_controls"_a = MemoryOpts{}.recall_controls,
            "Guesses xs (m, T + 1, nx), us (m, T, nu) with kind, source, trust and what the trust was made from (m, inputs).");
 }
 

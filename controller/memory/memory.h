@@ -8,8 +8,10 @@
 //   regression  the same end as a line, and the bow that a Gaussian process predicts between start and end. (Between given ends
 //               the bow is nearly unique; as a function of the task alone it has many modes, which regression would average.)
 //
-// Every guess is a motion without gaps: velocities are those of the path, controls its inverse dynamics. The memory composes
-// guesses; it does not rank them: that is the merit's business, in loop/.
+// States and controls are remembered together: the coefficients are those that lose least of both, and decode to the bow and to what
+// the solver's controls were beyond the inverse dynamics of the decoded motion. A guess is a motion without gaps: velocities are
+// those of the path, controls its inverse dynamics; with MemoryOpts::recall_controls the remembered difference is added to them.
+// The memory composes guesses; it does not rank them: that is the merit's business, in loop/.
 //
 // Templates over a Task (tables/<robot>_<task>/task.h). No heap, no exceptions, no I/O; bounded: operations are stated below.
 #ifndef CONTROLLER_MEMORY_MEMORY_H_
@@ -30,8 +32,8 @@ namespace engram {
 struct MemoryTables {
   const TabKnn* knn;      // memory_features -> end posture (nq), coefficients of the bow (m)
   const TabGpr* gpr;      // memory_bow_features -> coefficients of the bow (m)
-  const TabPca* bow;      // coefficients of the bow (m) -> its weights over time (k, nq)
-  const TabRbf* time;     // the Gaussians over time, nq channels; its domain [0, T] is the length of a remembered motion
+  const TabPca* bow;      // coefficients of the bow (m) -> weights over time (k, nq + nu) of bow and controls
+  const TabRbf* time;     // the Gaussians over time, nq + nu channels; its domain [0, T] is the length of a remembered motion
   const TabLogit* trust;  // memory_trust_inputs -> probability that the solver succeeds
 };
 
@@ -46,6 +48,7 @@ struct MemoryOpts {
   int neighbours = kMemoryNeighbours;  // 0 .. kMemoryNeighbours
   int lines = kMemoryLines;            // 0 .. kMemoryLines; the first needs neighbours
   bool regression = true;              // a regression beside every line
+  bool recall_controls = false;        // closer to the solver's controls, but no longer a motion: it opens gaps (docs/memory.md)
   double max_warp = 1.2;               // [rad] a neighbour whose end must turn a joint further is refused
 };
 
@@ -57,7 +60,7 @@ template <class Task> struct Guess {
   double trust;    // [0, 1] estimated probability that the solver succeeds from here
   double warp;     // [rad] largest joint difference between its end and where inverse kinematics started
   double x[N + 1][R::nq + R::nv];  // states at the knots; x[0] is the measured state
-  double u[N][R::nu];              // controls that drive x (inverse dynamics), not clamped
+  double u[N][R::nu];              // controls that drive x (inverse dynamics), or the recalled ones; not clamped
 };
 
 // What a query found. Every query writes all but the guesses beyond n.

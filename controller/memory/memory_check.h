@@ -20,7 +20,7 @@ template <class Task> TabStatus memory_check(const MemoryTables& tables, char* t
   const int m = tables.bow->m;
   const bool fit = tables.knn->d == kMemoryFeatures<Task> && tables.knn->m == R::nq + m &&  //
                    tables.gpr->d == kMemoryBowFeatures<Task> && tables.gpr->m == m && m <= kMemoryMaxBow &&
-                   tables.time->nchannel == R::nq && tables.bow->n == tables.time->k * R::nq &&
+                   tables.time->nchannel == R::nq + R::nu && tables.bow->n == tables.time->k * (R::nq + R::nu) &&
                    tables.trust->d == kMemoryTrustInputs;
   if (fit) return kTabOk;
   constexpr char kMisfit[] = "the memory's tables do not fit each other; run 'make tables' and build again";

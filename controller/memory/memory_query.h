@@ -31,7 +31,7 @@ template <class Task> struct MemoryWork {
   int32_t index[kMemoryPool];
   float distance2[kMemoryPool];
   alignas(64) float regression[kMemoryLines][kMemoryMaxBow + TAB_LANES];
-  alignas(64) float weights[TAB_RBF_MAX_K * nq + TAB_LANES];  // of a bow over time
+  alignas(64) float weights[TAB_RBF_MAX_K * (nq + R::nu) + TAB_LANES];  // of a bow and its controls over time
   double basis[(N + 1) * TAB_RBF_MAX_K];
   double bow[N + 1][nq];
   Pack path[N + 1][nq];  // kLanes guesses side by side
@@ -155,7 +155,7 @@ void judge(const MemoryTables& tables, typename MemoryWork<Task>::Slot& slot, Gu
   if (slot.reached) tab_logit_eval(tables.trust, slot.trust_inputs, &guess.trust);
 }
 
-// The bow of a slot at the knots -> lane l of w.path
+// The bow of a slot at the knots -> lane l of w.path; the weights of its controls stay in w.weights
 template <class Task>
 void decode_bow(const MemoryTables& tables, const typename MemoryWork<Task>::Slot& slot, int n, int l, MemoryWork<Task>& w) {
   constexpr int nq = Task::Robot::nq;
@@ -168,6 +168,19 @@ void decode_bow(const MemoryTables& tables, const typename MemoryWork<Task>::Slo
   tab_rbf_eval(tables.time, w.weights, 0, nq, n + 1, w.basis, w.bow[0]);
   for (int k = 0; k <= n; ++k)
     for (int i = 0; i < nq; ++i) w.path[k][i].l[l] = w.bow[k][i];
+}
+
+// What is added to the inverse dynamics of a slot, whose bow was decoded last -> guess.u
+template <class Task>
+void decode_controls(const MemoryTables& tables, const MemoryOpts& opts, const typename MemoryWork<Task>::Slot& slot, int n,
+                     const MemoryWork<Task>& w, Guess<Task>& guess) {
+  using R = typename Task::Robot;
+  if (opts.recall_controls && slot.bow != nullptr) {
+    tab_rbf_eval(tables.time, w.weights, R::nq, R::nu, n, w.basis, guess.u[0]);
+    return;
+  }
+  for (int k = 0; k < n; ++k)
+    for (double& u : guess.u[k]) u = 0;
 }
 
 }  // namespace memory
@@ -197,6 +210,7 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
     for (int l = 0; l < kLanes; ++l) {  // beyond the last guess: copies of the first
       const auto& slot = w.slot[first + (l < lanes ? l : 0)];
       memory::decode_bow<Task>(tables, slot, n, l, w);
+      if (l < lanes) memory::decode_controls<Task>(tables, opts, slot, n, w, answer.guess[first + l]);
       for (int i = 0; i < nq; ++i) end[i].l[l] = slot.end[i];
     }
     warp_bow<R>(x0, end, n, t, T, w.path);
@@ -205,7 +219,7 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
         Guess<Task>& guess = answer.guess[first + l];
         for (int i = 0; i < nq; ++i) guess.x[k][i] = q[i].l[l];
         for (int i = 0; i < nv; ++i) guess.x[k][nq + i] = v[i].l[l];
-        for (int i = 0; u != nullptr && i < nv; ++i) guess.u[k][i] = u[i].l[l];
+        for (int i = 0; u != nullptr && i < nv; ++i) guess.u[k][i] += u[i].l[l];
       }
     });
   }

@@ -15,7 +15,7 @@ from engram.tasks.spec import load_task
 from engram_sim import report, suboptimality, video
 from engram_sim.motion import Motion
 from engram_sim.pair import Pair, Progress, private_port, scene
-from engram_sim.results import MODES, Run, figures, read_run, read_runs
+from engram_sim.results import MODES, Run, figures, figures_name, read_run, read_runs
 from engram_sim.series import write_reach
 
 LOG_EVERY = 40  # plant steps between two states (and cycles) of the log: 25 a second, as many as the video shows
@@ -109,9 +109,9 @@ def finish(
             run.suboptimality = {k: curves[run.mode][:, k] for k in (1, 3)}
     summary = header | {"wall_s": round(seconds, 1), "modes": {run.mode: run.summary() for run in runs}}
     write_summary(folder, summary)
-    records = figures(header["robot"], runs)
+    records = figures(header["robot"], runs, header["seed"])
     figures_folder.mkdir(parents=True, exist_ok=True)
-    (figures_folder / "demo.json").write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
+    (figures_folder / figures_name(header["seed"])).write_text(json.dumps(records, indent=1) + "\n", encoding="utf-8")
 
     spec = load_task(header["robot"], header["task"])
     motions = [Motion(run, spec.robot, spec.frame) for run in runs]

@@ -181,7 +181,8 @@ def write(
     robot, task = html.escape(summary["robot"]), html.escape(summary["task"])
     shown = ""
     if video:
-        shown = f'<video src="{html.escape(video.name)}" controls loop muted preload="metadata"></video><p>{VIDEO}</p>'
+        name = html.escape(video.stem)
+        shown = f'<video src="{name}.mp4" poster="{name}.png" controls loop muted preload="metadata"></video><p>{VIDEO}</p>'
     moves = [
         f"{mode} {1e3 * row['move_error_mean_m']:.1f} mm" for mode, row in summary["modes"].items() if "move_error_mean_m" in row
     ]

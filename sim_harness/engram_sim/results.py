@@ -121,13 +121,22 @@ def read_runs(folder: Path) -> list[Run]:
     return runs
 
 
-def figures(robot: str, runs: list[Run]) -> list[dict[str, Any]]:
-    """Records of build/figures/demo.json; what was not measured is absent."""
+SEED = 1  # of the series whose figures bear no seed in their name
+
+
+def figures_name(seed: int) -> str:
+    """The file in build/figures/ that a demo of this seed writes: another seed leaves the figures of SEED alone."""
+    return "demo.json" if seed == SEED else f"demo-seed{seed}.json"
+
+
+def figures(robot: str, runs: list[Run], seed: int = SEED) -> list[dict[str, Any]]:
+    """Records of figures_name(seed); what was not measured is absent."""
     records = []
+    prefix = f"demo.{robot}" if seed == SEED else f"demo.{robot}.seed{seed}"
 
     def add(name: str, value: float | None, unit: str, n: int) -> None:
         if value is not None:
-            records.append({"id": f"demo.{robot}.{name}", "value": value, "unit": unit, "n": n})
+            records.append({"id": f"{prefix}.{name}", "value": value, "unit": unit, "n": n})
 
     rows = {run.mode: run.summary() for run in runs}
     for mode, row in rows.items():

@@ -70,6 +70,18 @@ def test_log_is_read_by_lcm(arena: Arena) -> None:
     assert ours == theirs and len(ours) > 1000
 
 
+def test_log_is_played_by_lcm_logplayer(arena: Arena) -> None:
+    run_log(arena, "run.lcm", "--log-full", "0.1")
+    net, heard = lcm.LCM(arena.url), []
+    net.subscribe(".*", lambda channel, data: heard.append((channel, data))).set_queue_capacity(0)  # 0: no bound
+    player = subprocess.Popen(["lcm-logplayer", "--speed", "10", "--lcm-url", arena.url, arena.folder / "run.lcm"])
+    while net.handle_timeout(500) > 0:
+        pass
+    assert player.wait() == 0
+    written = [(channel, data) for _, channel, data in eventlog.events(arena.folder / "run.lcm")]
+    assert [message for message in heard if message[0] in eventlog.CHANNELS] == written and len(written) > 500
+
+
 def test_thinned_log_keeps_each_nth_state_with_its_cycle_and_the_first_cycle_of_a_jump(arena: Arena) -> None:
     run_log(arena, "run.lcm", "--log-full", "0.1", "--log-every", "20")
     log = eventlog.read(arena.folder / "run.lcm", list(eventlog.CHANNELS))

@@ -81,8 +81,8 @@ TEST(MemoryCheck, AMissingForeignOrMisfittingTableIsNamed) {
   EXPECT_EQ(memory_check<Task>(tables, text), kTabBad);
   EXPECT_NE(std::string(text).find("another robot"), std::string::npos) << text;
 
-  TabRbf other = panda_reach_time_v1;  // whole in itself, but for a robot of another size
-  other.nchannel = other.head.nout = nq + 1;
+  TabRbf other = panda_reach_time_v1;  // whole in itself, but without channels for the controls
+  other.nchannel = other.head.nout = nq;
   tables = kTables;
   tables.time = &other;
   EXPECT_EQ(memory_check<Task>(tables, text), kTabBad);
@@ -173,6 +173,31 @@ TEST(MemoryQuery, ARememberedTaskIsRecalled) {
     for (int g = 0; g < answer.n; ++g) recalled += answer.guess[g].kind == GuessKind::kNeighbour && answer.guess[g].source == sample;
   }
   EXPECT_EQ(recalled, kSamples);
+}
+
+TEST(MemoryQuery, RecalledControlsAreAddedToThoseOfTheSameMotion) {
+  int recalled = 0;
+  for (unsigned seed = 0; seed < 10; ++seed) {
+    Query query(seed), other(seed);
+    other.opts.recall_controls = true;
+    const MemoryAnswer<Task>&motions = query.ask(), &answer = other.ask();
+    ASSERT_EQ(answer.n, motions.n);
+    for (int g = 0; g < answer.n; ++g) {
+      const Guess<Task>&a = motions.guess[g], &b = answer.guess[g];
+      EXPECT_EQ(std::memcmp(a.x, b.x, sizeof a.x), 0);
+      double most = 0;
+      for (int k = 0; k < N; ++k)
+        for (int i = 0; i < R::nu; ++i) most = std::fmax(most, std::fabs(b.u[k][i] - a.u[k][i]));
+      if (b.kind == GuessKind::kLine) {
+        EXPECT_EQ(most, 0) << "a line remembers nothing";
+        continue;
+      }
+      EXPECT_GT(most, 0.01);  // N m
+      EXPECT_LT(most, 30);    // N m: a correction, not another motion
+      ++recalled;
+    }
+  }
+  EXPECT_GT(recalled, 30);
 }
 
 TEST(MemoryQuery, NothingUsableGivesNoGuess) {

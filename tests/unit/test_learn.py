@@ -15,10 +15,10 @@ from sklearn.gaussian_process.kernels import RBF, ConstantKernel, WhiteKernel
 
 from engram.emit import write_tables
 from engram.inputs import InputError
-from engram.learn.bow import fit_bow_code
+from engram.learn.bow import fit_bow_code, inverse_dynamics
 from engram.learn.dataset import FEWEST, load_motions, rotation
 from engram.learn.gpr import fit_gpr, fit_hyperparameters, round_digits
-from engram.learn.memory import Memory, Motions, Settings, features, fit_memory
+from engram.learn.memory import Memory, Motions, Settings, features, fit_memory, rms
 from engram.learn.reproducible import PINNED, pinned
 from engram.learn.timebase import TimeBasis
 from engram.learn.trust import Trials, fit_trust, probability
@@ -26,6 +26,18 @@ from engram.learn.trust import Trials, fit_trust, probability
 T = 1.5
 TIMES = np.linspace(0, T, 51)
 TIME = TimeBasis(18, T)
+
+
+class UnitMasses:
+    """A robot of the compiled engine whose joints are unit masses that do not feel each other."""
+
+    @staticmethod
+    def rnea(q: np.ndarray, v: np.ndarray, a: np.ndarray) -> np.ndarray:
+        return a
+
+    @staticmethod
+    def crba(q: np.ndarray) -> np.ndarray:
+        return np.broadcast_to(np.eye(q.shape[1]), (len(q), q.shape[1], q.shape[1]))
 
 
 def minimum_jerk(n: int, seed: int = 0) -> tuple[np.ndarray, np.ndarray]:
@@ -49,7 +61,7 @@ def test_gaussians_restore_smooth_motions_and_their_ends() -> None:
 
 def test_a_bow_decodes_to_its_motion_and_vanishes_at_the_ends() -> None:
     _, q = minimum_jerk(200)
-    code = fit_bow_code(TIME, TIMES, q, 2)  # the data bow in two ways
+    code = fit_bow_code(TIME, TIMES, q, inverse_dynamics(UnitMasses, TIMES, q), UnitMasses, 2)  # the data bow in two ways
     z = code.encode(TIMES, q)
     assert np.abs(code.decode(z, TIMES, q[:, 0], q[:, -1]) - q).max() < 2e-3  # rad
     np.testing.assert_allclose(z.std(axis=0), 1.0, rtol=1e-9)  # coefficients in units of their spread
@@ -60,6 +72,21 @@ def test_a_bow_decodes_to_its_motion_and_vanishes_at_the_ends() -> None:
     np.testing.assert_allclose(bent[:, [0, -1]].transpose(1, 0, 2), ends, atol=1e-9)  # rounding of the KKT system
 
 
+def test_controls_are_remembered_beyond_the_inverse_dynamics() -> None:
+    _, q = minimum_jerk(200)
+    friction = 2.0 * (q[:, :1] * q[:, -1:])[:, :, :1]  # N m that no model knows, but the bow tells
+    u = inverse_dynamics(UnitMasses, TIMES, q) + friction
+    code = fit_bow_code(TIME, TIMES, q, u, UnitMasses, 2)
+    z = code.encode(TIMES, q)
+    motion = inverse_dynamics(UnitMasses, TIMES, code.decode(z, TIMES, q[:, 0], q[:, -1]))
+    beyond = code.decode_controls(z, TIMES[:-1])
+    assert rms(motion + beyond - u) < 0.3 * rms(motion - u)
+    mean, basis = code.table()
+    assert mean.shape == (18 * 4,) and basis.shape == (2, 18 * 4)
+    channels = np.einsum("tk,nkc->ntc", TIME.phi(TIMES[:-1]), (mean + z @ basis).reshape(len(z), 18, 4))
+    np.testing.assert_allclose(channels[:, :, 2:], beyond, atol=1e-12)  # the same sums in another order
+
+
 def test_more_components_never_fit_worse() -> None:
     rng = np.random.default_rng(3)
     q = minimum_jerk(100)[1] + 0.2 * np.sin(np.pi * np.outer(rng.uniform(1, 4, 100), TIMES))[:, :, None] * rng.normal(
@@ -67,7 +94,7 @@ def test_more_components_never_fit_worse() -> None:
     )
     errors = []
     for m in (2, 4, 8, 16):
-        code = fit_bow_code(TIME, TIMES, q, m)
+        code = fit_bow_code(TIME, TIMES, q, inverse_dynamics(UnitMasses, TIMES, q), UnitMasses, m)
         errors.append(np.abs(code.decode(code.encode(TIMES, q), TIMES, q[:, 0], q[:, -1]) - q).mean())
     assert errors == sorted(errors, reverse=True) and errors[-1] < 0.2 * errors[0]
 
@@ -118,8 +145,9 @@ def arm_memory() -> Memory:
     bow = np.sin(np.pi * s) ** 2 * (0.8 * np.sin(2 * start[:, :1]) * np.linspace(1, 2, 7))[:, None, :]
     q = (1 - s) * start[:, None] + s * end[:, None] + bow
     R_WT = rotation(rng.normal(size=(n, 4)))
-    motions = Motions(features(start, p_WT, R_WT), TIMES, q, np.arange(n) % 5 == 4)
-    return fit_memory(motions, SMALL)
+    u = inverse_dynamics(UnitMasses, TIMES, q) + 0.5 * start[:, None]  # N m beyond the model: it does not know this friction
+    motions = Motions(features(start, p_WT, R_WT), TIMES, q, u, np.arange(n) % 5 == 4)
+    return fit_memory(motions, UnitMasses, SMALL)
 
 
 def test_a_memory_of_smooth_motions_recalls_them() -> None:
@@ -128,7 +156,7 @@ def test_a_memory_of_smooth_motions_recalls_them() -> None:
     assert report["time.rms"] < 2e-3 and report["bow.rms"] < 2e-3  # rad
     assert report["gpr.rms"] < 0.1  # rad; 100 samples in 17 dimensions, of which it must find the one that matters
     assert memory.knn.x.shape == (120, 16) and memory.knn.value.shape == (120, 7 + 6) and memory.gpr.x.shape == (100, 17)
-    assert memory.bow.basis.shape == (6, 12 * 7) and memory.time.channels == 7
+    assert memory.bow.basis.shape == (6, 12 * 14) and memory.time.channels == 14
 
 
 def test_the_same_motions_make_the_same_bytes(tmp_path: Path) -> None:

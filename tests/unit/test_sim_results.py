@@ -10,7 +10,7 @@ import pytest
 
 from engram.inputs import InputError
 from engram_sim import eventlog
-from engram_sim.results import enumerators, figures, read_csv, read_run, wilson
+from engram_sim.results import enumerators, figures, figures_name, read_csv, read_run, wilson
 from engram_sim.suboptimality import ITERATIONS, read_jumps, suboptimality
 
 
@@ -92,6 +92,9 @@ def test_summary_counts_and_times(tmp_path: Path) -> None:
     assert (row["jumps"], row["successes"], row["late"], row["contact"], row["limit"]) == (4, 2, 1, 1, 1)
     assert row["success"] == 0.5 and row["arrival_median_s"] == 1.5 and row["query_share"] == 0.05
     records = {record["id"]: record for record in figures("panda", [run])}
+    other = [record["id"] for record in figures("panda", [run], 7)]
+    assert figures_name(1) == "demo.json" and figures_name(7) == "demo-seed7.json"
+    assert other == [name.replace("demo.panda.", "demo.panda.seed7.") for name in records]
     assert records["demo.panda.success.memory"]["value"] == 0.5 and records["demo.panda.success.memory"]["n"] == 4
     assert records["demo.panda.cycle_us.max"]["value"] == 100.0
     assert "demo.panda.subopt1.memory" not in records  # not measured: absent

@@ -34,7 +34,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument(
         "--plant-option", action="append", default=[], metavar="OPTION=VALUE", help="for engram-plant, e.g. noise-v=0.01"
     )
-    parser.add_argument("--figures", type=Path, default=BUILD / "figures", help="where demo.json goes (default: build/figures/)")
+    parser.add_argument(
+        "--figures",
+        type=Path,
+        default=BUILD / "figures",
+        help="where demo.json goes; of another seed: demo-seed<n>.json (default: build/figures/)",
+    )
     parser.add_argument("--controller", type=Path, help="program to run (default: engram-controller of the build)")
     return parser
 

@@ -45,6 +45,7 @@ def run(args: argparse.Namespace) -> int:
 
     restart_pinned()
     from engram.emit import write_tables
+    from engram.engine import engine
     from engram.inputs import InputError
     from engram.learn.dataset import load_motions
     from engram.learn.figures import write_figures
@@ -60,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
     source = load_motions(args.data or BUILD / "data" / f"{name}.npz", spec, HELD_OUT)
     motions = source.motions
     print(f"fit:    {len(motions.x)} motions, {int(motions.held_out.sum())} of them held out")
-    memory = fit_memory(motions, Settings(), lambda text: print(f"fit:    {text}", flush=True))
+    memory = fit_memory(motions, getattr(engine, args.robot), Settings(), lambda text: print(f"fit:    {text}", flush=True))
     print("fit:    trust: trying guesses on held-out tasks", flush=True)
     trust, trust_report = fit_trust(try_guesses(spec, memory, source, args.trials))
     manifest = write_tables(
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     size = sum(file["bytes"] for file in manifest["files"].values())
     report = [*memory.report, *decoding_loss(spec, memory, source), *trust_report, ("bytes", float(size), "byte")]
     for key, value, unit in report:
-        print(f"fit:    {key:<26} {value:.4g} {unit}")
+        print(f"fit:    {key:<28} {value:.4g} {unit}")
     write_figures("fit", [(f"fit.{name}.{key}", value, unit, int(motions.held_out.sum())) for key, value, unit in report])
     print(f"fit:    {relative(args.out / name)}: {len(manifest['files'])} files")
     if args.contest > 0:

@@ -10,7 +10,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     """Arguments of `engram report`."""
     parser = subparsers.add_parser("report", help=__doc__, description=__doc__, epilog="example:\n  engram report runs/latest")
     parser.add_argument("folder", type=Path, help="folder of a demo")
-    parser.add_argument("--figures", type=Path, default=BUILD / "figures", help="where demo.json goes (default: build/figures/)")
+    parser.add_argument(
+        "--figures",
+        type=Path,
+        default=BUILD / "figures",
+        help="where demo.json goes; of another seed: demo-seed<n>.json (default: build/figures/)",
+    )
     return parser
 
 

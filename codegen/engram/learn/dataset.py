@@ -24,7 +24,6 @@ class Source:
     motions: Motions
     vector: np.ndarray
     xs: np.ndarray  # (n, knots + 1, nx)
-    us: np.ndarray  # (n, knots, nu)
     cost: np.ndarray  # (n,)
     digest: str
     made_from: str
@@ -65,5 +64,5 @@ def load_motions(path: Path, spec: TaskSpec, held_out: int) -> Source:
     for array in (X, xs, us, t):
         sha.update(np.ascontiguousarray(array).tobytes())
     x = features(X[:, :nq], X[:, nq : nq + 3], rotation(X[:, nq + 3 : nq + 7]))
-    motions = Motions(x, t, xs[:, :, :nq], np.arange(len(X)) % held_out == held_out - 1)
-    return Source(motions, X[:, nq:], xs, us, cost, sha.hexdigest()[:16], made_from)
+    motions = Motions(x, t, xs[:, :, :nq], us, np.arange(len(X)) % held_out == held_out - 1)
+    return Source(motions, X[:, nq:], xs, cost, sha.hexdigest()[:16], made_from)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from engram.emit import Gpr, Knn, Pca, Rbf
-from engram.learn.bow import BowCode, fit_bow_code, straight
+from engram.learn.bow import BowCode, Dynamics, fit_bow_code, straight
 from engram.learn.gpr import FittedGpr, fit_gpr, fit_hyperparameters
 from engram.learn.timebase import TimeBasis
 
@@ -18,7 +18,8 @@ class Settings:
     """What a fit may choose."""
 
     gaussians: int = 22
-    components: int = 49  # coefficients of a bow
+    width: float = 1.3  # of a Gaussian, in spacings of their centres
+    components: int = 57  # coefficients of a bow
     weights: tuple[float, float, float, float] = (1.0, 4.0, 1.0, 0.5)  # k-NN: q, p_WT, target z axis, target x axis
     regression_samples: int = 500
     hyperparameter_samples: int = 300
@@ -28,11 +29,15 @@ class Settings:
 
 @dataclass(frozen=True)
 class Motions:
-    """Solved: x (n, nq + 9) start q [rad], target p_WT [m], its z and x axes; t (nt,) [s]; q (n, nt, nq); held_out (n,)."""
+    """Solved: x (n, nq + 9) start q [rad], target p_WT [m], its z and x axes; t (nt,) [s]; q (n, nt, nq); u (n, nt - 1, nu).
+
+    held_out (n,): kept for judging a fit.
+    """
 
     x: np.ndarray
     t: np.ndarray
     q: np.ndarray
+    u: np.ndarray
     held_out: np.ndarray
 
     @property
@@ -79,14 +84,17 @@ def rms(error: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(error))))
 
 
-def fit_memory(motions: Motions, settings: Settings, progress: Callable[[str], None] = lambda text: None) -> Memory:
+def fit_memory(
+    motions: Motions, dynamics: Dynamics, settings: Settings, progress: Callable[[str], None] = lambda text: None
+) -> Memory:
     """Fit everything but the trust on the motions that are not held out, and measure the errors on those that are."""
     x = np.asarray(motions.x, np.float32).astype(float)
     train, test = ~motions.held_out, motions.held_out
     nq, horizon = motions.nq, float(motions.t[-1])
     n_test = int(test.sum())
     progress(f"bows: {settings.gaussians} Gaussians, {settings.components} components")
-    code = fit_bow_code(TimeBasis(settings.gaussians, horizon), motions.t, motions.q[train], settings.components)
+    basis = TimeBasis(settings.gaussians, horizon, settings.width)
+    code = fit_bow_code(basis, motions.t, motions.q[train], motions.u[train], dynamics, settings.components)
     z = code.encode(motions.t, motions.q)
     end = motions.q[:, -1]
     decoded = code.decode(z[test], motions.t, motions.q[test][:, 0], end[test])
@@ -119,14 +127,15 @@ def fit_memory(motions: Motions, settings: Settings, progress: Callable[[str], N
         held_out_text=f"[rad] rms of a motion between its true ends, its bow predicted, on {n_test} held-out motions",
     )  # fmt: skip
 
+    table_mean, table_basis = code.table()
     bow = Pca(
-        role="bow", mean=code.mean, basis=code.basis, inputs=[(f"z{i}", "1") for i in range(code.components)],
+        role="bow", mean=table_mean, basis=table_basis, inputs=[(f"z{i}", "1") for i in range(code.components)],
         lo=z[train].min(axis=0), hi=z[train].max(axis=0), held_out_error=code_error,
         held_out_text=f"[rad] rms of a decoded motion on {n_test} held-out motions",
     )  # fmt: skip
     time_error = rms(time_residual(code.time, motions.t, motions.q[test]))
     time = Rbf(
-        role="time", center=code.time.center, width=code.time.width, channels=nq, inputs=[("t", "s")],
+        role="time", center=code.time.center, width=code.time.width, channels=nq + motions.u.shape[2], inputs=[("t", "s")],
         lo=np.zeros(1), hi=np.array([horizon]), held_out_error=time_error,
         held_out_text=f"[rad] rms of a motion's Gaussians before PCA on {n_test} held-out motions",
     )  # fmt: skip

@@ -8,7 +8,8 @@ from engram.data.reach import OK, ReachSolver
 from engram.data.reach import Settings as SolverSettings
 from engram.engine import engine
 from engram.learn.dataset import Source
-from engram.learn.memory import Memory
+from engram.learn.memory import Memory, rms
+from engram.learn.timebase import TimeBasis
 from engram.learn.trust import Trials, constant_trust
 from engram.robots.emit_header import camel
 from engram.tasks.spec import TaskSpec
@@ -36,24 +37,42 @@ def try_guesses(spec: TaskSpec, memory: Memory, source: Source, tasks: int) -> T
 
 
 def decoding_loss(spec: TaskSpec, memory: Memory, source: Source) -> list[tuple[str, float, str]]:
-    """What a held-out motion loses by being remembered, between its own ends.
+    """What held-out motions lose by being remembered, between their own ends, by where their controls come from.
 
-    Its controls come back as the inverse dynamics of its path: their error beside the spread of the solver's own, and the cost
-    of the motion above the solver's.
+    `dynamics`: the inverse dynamics of the decoded motion, the guess without gaps; `recalled`: with what the table remembers of
+    the controls beyond that; `stored`: decoded from as many coefficients of their own, without any model. For each: error of the
+    controls, and suboptimality of the guess and after one iteration (median merit above the solver's cost). `spread`: standard
+    deviation of the solver's controls over a motion.
     """
     solver = ReachSolver(spec, 0, SolverSettings())
-    motions = source.motions
-    error, spread, loss = [], [], []
-    for i in np.flatnonzero(motions.held_out):
-        q = motions.q[i : i + 1]
-        path = memory.code.decode(memory.code.encode(motions.t, q), motions.t, q[:, 0], q[:, -1])
-        solver.set(q[0, 0], source.vector[i])
-        xs, us = solver.problem.warp(path, np.ascontiguousarray(q[:, -1]))
-        error.append(us[0] - source.us[i])
-        spread.append(source.us[i] - source.us[i].mean(axis=0))
-        loss.append(solver.problem.merit(xs, us)[0] / source.cost[i] - 1)
+    motions, code = source.motions, memory.code
+    test = motions.held_out
+    q, u, cost = motions.q[test], motions.u[test], source.cost[test]
+    z = code.encode(motions.t, q)
+    paths, beyond = code.decode(z, motions.t, q[:, 0], q[:, -1]), code.decode_controls(z, motions.t[:-1])
+    stored = recalled_alone(code.time, motions.t[:-1], motions.u[~test], u, code.components)
+    errors: dict[str, list] = {"dynamics": [], "recalled": [], "stored": []}
+    loss: dict[tuple[str, int], list] = {(kind, k): [] for kind in errors for k in (0, 1)}
+    for i, vector in enumerate(source.vector[test]):
+        solver.set(q[i, 0], vector)
+        xs, us = (guess[0] for guess in solver.problem.warp(paths[i : i + 1], np.ascontiguousarray(q[i : i + 1, -1])))
+        for kind, guess in (("dynamics", us), ("recalled", us + beyond[i]), ("stored", stored[i])):
+            errors[kind].append(guess - u[i])
+            found = solver.problem.solve(xs, guess, iterations=1, stop=solver.settings.stop)
+            for k, trajectory in enumerate(((xs, guess), (found["xs"], found["us"]))):
+                merit = solver.problem.merit(*(part[None] for part in trajectory))[0]
+                loss[kind, k].append(merit / cost[i] - 1)
     return [
-        ("us.rms", float(np.sqrt(np.mean(np.square(error)))), "N m"),
-        ("us.spread", float(np.sqrt(np.mean(np.square(spread)))), "N m"),
-        ("decoded.suboptimality", float(np.median(loss)), "1"),
+        ("us.spread", rms(u - u.mean(axis=1, keepdims=True)), "N m"),
+        *((f"us.rms.{kind}", rms(np.array(error)), "N m") for kind, error in errors.items()),
+        *((f"decoded.subopt{k}.{kind}", float(np.median(values)), "1") for (kind, k), values in loss.items()),
     ]
+
+
+def recalled_alone(time: TimeBasis, t: np.ndarray, known: np.ndarray, u: np.ndarray, components: int) -> np.ndarray:
+    """Controls u (n, nt, nu) as Gaussians over time and `components` principal components of the `known` ones, back again."""
+    first, second = (time.fit(t, values, pin_ends=False).reshape(len(values), -1) for values in (known, u))
+    mean = first.mean(axis=0)
+    rows = np.linalg.svd(first - mean, full_matrices=False)[2][:components]
+    weights = (mean + (second - mean) @ rows.T @ rows).reshape(len(u), time.k, -1)
+    return np.einsum("tk,nkc->ntc", time.phi(t), weights)
