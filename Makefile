@@ -1,13 +1,15 @@
 # The front doors of Engram. Every target sets up what it needs and skips what is done.
-# SEED=n selects another series of tasks, JOBS=n the number of parallel compilations, PYTHON=... the interpreter; ARGS="..." goes
+# ROBOT=panda|talos|anymal|hector and TASK=... choose what is shown, SEED=n another series of tasks, JOBS=n the number of parallel compilations, PYTHON=... the interpreter; ARGS="..." goes
 # to the command behind the target.
 SHELL := /bin/bash
 SEED ?= 1
+ROBOT ?= panda
 export JOBS PYTHON
 
 .PHONY: help demo test bench tables study clean setup
 help:
 	@echo "make demo    run the arm that remembers: video, report and summary in runs/<time>/   (SEED=n)"
+	@echo "make demo ROBOT=talos|anymal|hector   the same of a humanoid, a quadruped, a quadrotor (TASK=...)"
 	@echo "make test    build everything and run every test"
 	@echo "make bench   time the controller beside its peers"
 	@echo "make study   make a row of the thesis again beside ours: S=6.3, or S=6 for a chapter   (QUICK=1)"
@@ -20,7 +22,7 @@ setup:
 # The demo needs three programs and the binding; the tests can wait.
 demo: export TARGETS = engram-controller engram-plant engram-render _engine
 demo: setup
-	@.venv/bin/engram demo --seed $(SEED) $(ARGS)
+	@.venv/bin/engram demo --robot $(ROBOT) $(if $(TASK),--task $(TASK)) --seed $(SEED) $(ARGS)
 
 test: setup
 	@scripts/test.sh $(ARGS)

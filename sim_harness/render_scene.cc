@@ -1,6 +1,7 @@
 #include "sim_harness/render_scene.h"
 
 #include <algorithm>
+#include <cmath>
 
 namespace engram::sim {
 namespace {
@@ -39,6 +40,11 @@ std::string Scene::open(const char* scene, const char* camera, const char* hand,
   camera_.fixedcamid = mj_name2id(model_.m, mjOBJ_CAMERA, camera);
   if (camera_.fixedcamid >= 0) {
     camera_.type = mjCAMERA_FIXED;
+  } else if (model_.free_base) {  // goes along with the robot
+    follows_ = true;
+    const double height = model_.m->key_qpos ? model_.m->key_qpos[2] : 0.5;
+    camera_.lookat[2] = 0.6 * height;
+    camera_.distance = 1.2 + 1.9 * height, camera_.azimuth = 140, camera_.elevation = -14;
   } else {
     camera_.lookat[0] = 0.35, camera_.lookat[1] = 0, camera_.lookat[2] = 0.4;
     camera_.distance = 2.0, camera_.azimuth = 150, camera_.elevation = -20;
@@ -111,13 +117,15 @@ void Scene::draw(const Panel& panel) {
   if (panel.q) pose(*panel.q);
   const int target = mj_name2id(model_.m, mjOBJ_BODY, "target");
   const int mocap = target >= 0 ? model_.m->body_mocapid[target] : -1;
-  if (mocap >= 0 && panel.target && panel.target->size() >= 7) {
+  if (mocap >= 0 && panel.target && panel.target->size() >= 4) {  // p_WT and quaternion x y z w, or yaw
     const std::vector<double>& t = *panel.target;
-    const double quat[4] = {t[6], t[3], t[4], t[5]};
+    double quat[4] = {std::cos(0.5 * t[3]), 0, 0, std::sin(0.5 * t[3])};
+    if (t.size() >= 7) quat[0] = t[6], quat[1] = t[3], quat[2] = t[4], quat[3] = t[5];
     mju_copy3(model_.d->mocap_pos + 3 * mocap, t.data());
     mju_copy4(model_.d->mocap_quat + 4 * mocap, quat);
     mj_kinematics(model_.m, model_.d);
   }
+  if (follows_) mju_copy(camera_.lookat, model_.base_position(), 2);
   mjv_updateScene(model_.m, model_.d, &option_, nullptr, &camera_, mjCAT_ALL, &scene_);
   add_line(panel.trail, 0.005, kTrailFrom, kTrailTo);
   if (panel.plan) add_line(*panel.plan, 0.008, kPlanFrom, kPlanTo);

@@ -19,7 +19,7 @@ using Point = std::array<double, 3>;
 struct Panel {
   mjrRect rect{};
   const std::vector<double>* q = nullptr;
-  const std::vector<double>* target = nullptr;  // p_WT, quaternion x y z w
+  const std::vector<double>* target = nullptr;  // task vector: p_WT, and quaternion x y z w or yaw
   const std::vector<Point>* plan = nullptr;     // planned hand positions (m)
   std::vector<Point> trail;                     // where the hand was (m)
   std::string title, note, outcome;
@@ -53,6 +53,7 @@ class Scene {
   mjvCamera camera_{};
   mjrContext context_{};
   OSMesaContext osmesa_ = nullptr;
+  bool follows_ = false;  // the camera goes along with the base
   int width_ = 0, height_ = 0;
   std::vector<unsigned char> surface_, pixels_;
 };

@@ -8,16 +8,18 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from engram.inputs import InputError
-from engram.paths import ROOT, relative
+from engram.inputs import InputError, closest
+from engram.paths import BUILD, ROOT, relative
+from engram.robots.spec import known_robots
 from engram.tasks.scene import write_shown_scene
-from engram.tasks.spec import load_task
-from engram_sim import report, suboptimality, video
+from engram.tasks.spec import known_tasks, load_task, open_task
+from engram_sim import motion_demo, report, suboptimality, video
 from engram_sim.motion import Motion
 from engram_sim.pair import Pair, Progress, private_port, scene
 from engram_sim.results import MODES, Run, figures, figures_name, read_run, read_runs
 from engram_sim.series import write_reach
 
+JUMPS = 300  # of a series, unless told otherwise
 LOG_EVERY = 40  # plant steps between two states (and cycles) of the log: 25 a second, as many as the video shows
 LOG_TRUNCATED = 3  # exit code of engram-plant: all done, but the disk was full
 SLOWEST_FIRST = ("cold", "shift", "line", "memory")  # so that no long run is left alone at the end
@@ -25,16 +27,32 @@ SLOWEST_FIRST = ("cold", "shift", "line", "memory")  # so that no long run is le
 
 def demo(args: argparse.Namespace) -> int:
     """Run `engram demo`; arguments as its parser has them."""
+    if args.robot not in known_robots():
+        raise InputError(f"unknown robot '{args.robot}'; {closest(args.robot, known_robots())}")
+    args.task = args.task or next(iter(known_tasks(args.robot)), "")
+    if open_task(args.robot, args.task).data["kind"] == "reach":
+        return reach_demo(args)
+    return motion_demo.demo(args, run_folder(args.out))
+
+
+def run_folder(out: Path | None) -> Path:
+    """The folder of a new run, which runs/latest then shows to."""
+    folder = (out or ROOT / "runs" / time.strftime("%Y-%m-%d-%H%M%S")).resolve()
+    folder.mkdir(parents=True, exist_ok=True)
+    point_latest(folder)
+    return folder
+
+
+def reach_demo(args: argparse.Namespace) -> int:
+    """A series of targets in several modes of the controller."""
     start = time.monotonic()
+    args.jumps = JUMPS if args.jumps is None else args.jumps
     modes = [mode.strip() for mode in args.modes.split(",") if mode.strip()]
     if unknown := [mode for mode in modes if mode not in MODES]:
         raise InputError(f"--modes: unknown mode '{unknown[0]}'; known: {', '.join(MODES)}")
     if args.jumps < 1 or not modes:
         raise InputError("--jumps and --modes: at least one jump and one mode")
-    folder = (args.out or ROOT / "runs" / time.strftime("%Y-%m-%d-%H%M%S")).resolve()
-    folder.mkdir(parents=True, exist_ok=True)
-    point_latest(folder)
-
+    folder = run_folder(args.out)
     series = folder / "series.txt"
     moving = write_reach(series, args.robot, args.task, args.seed, args.jumps)
     print(f"series  {args.jumps} jumps, {moving} moving targets, seed {args.seed}: {relative(series)}")
@@ -70,6 +88,7 @@ def run_modes(args: argparse.Namespace, modes: list[str], folder: Path, series: 
             progress.show(sum(map(len, ended.values())), note)
 
         pair = Pair(folder / mode, series, scene(args.robot, args.task), private_port(MODES.index(mode)), mode, clock=args.clock)
+        pair.model = f"{args.robot}_{args.task}"
         pair.controller = args.controller
         pair.plant_options = ["--log-full", str(args.log_full), "--log-every", str(LOG_EVERY), *options]
         code = pair.run(jumped)
@@ -152,10 +171,17 @@ def read_summary(folder: Path) -> dict[str, Any]:
         raise InputError(f"{relative(folder)}/summary.json: cannot be read ({error}); give the folder of a demo") from None
 
 
+def is_motion(header: dict[str, Any]) -> bool:
+    """Whether the summary is that of a motion's demo."""
+    return open_task(header["robot"], header["task"]).data["kind"] == "motion"
+
+
 def report_again(folder: Path, figures_folder: Path) -> int:
     """Write the report of a finished demo again."""
     folder = folder.resolve()
     header = read_summary(folder)
+    if is_motion(header):
+        return motion_demo.finish(folder, header, 0.0, figures_folder)
     drawn = folder / "demo.mp4"
     finish(folder, read_runs(folder), header, drawn if drawn.is_file() else None, header.get("wall_s", 0.0), figures_folder)
     return 0
@@ -165,6 +191,8 @@ def render_again(folder: Path, seconds: float, modes: str | None, jobs: int, out
     """Draw the video of a finished demo again."""
     folder = folder.resolve()
     header = read_summary(folder)
+    if is_motion(header):
+        return motion_demo.finish(folder, header, seconds, BUILD / "figures")
     wanted = modes.split(",") if modes else list(MODES)
     runs = [run for run in read_runs(folder) if run.mode in wanted]
     if not runs:

@@ -69,19 +69,27 @@ def render(runs: list[Run], scene: Path, out: Path, hand: str, seconds: float = 
     chosen = choose(runs, seconds)
     if not chosen:
         return None
-    lines = [clip_line(runs, *clip) for clip in chosen]
+    draw(runs, [clip_line(runs, *clip) for clip in chosen], scene, out, hand, jobs)
+    return out
+
+
+def draw(runs: list[Run], lines: list[str], scene: Path, out: Path, hand: str, jobs: int = 2, title: str = "") -> None:
+    """Draw clips (lines of a clips file of engram-render) of the runs side by side into `out` with `jobs` processes.
+
+    `title` stands for the modes' own.
+    """
     jobs = max(1, min(jobs, len(lines)))
     share = -(-len(lines) // jobs)
     parts = [lines[i : i + share] for i in range(0, len(lines), share)]
     frames, total = [0] * len(parts), [0] * len(parts)
     progress = Progress(round(25 * sum(float(line.partition(";")[0]) for line in lines)), "video ")
 
-    def draw(k: int) -> Path:
+    def draw_part(k: int) -> Path:
         clips, part = out.with_suffix(f".{k}.txt"), out.with_suffix(f".{k}.mp4")
         clips.write_text("\n".join(parts[k]) + "\n", encoding="utf-8")
         call = [str(program("engram-render")), "--scene", str(scene), "--out", str(part), "--clips", str(clips), "--hand", hand]
         for run in runs:
-            call += ["--panel", f"{TITLES.get(run.mode, run.mode)}={run.log}"]
+            call += ["--panel", f"{title or TITLES.get(run.mode, run.mode)}={run.log}"]
         process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, stdin=subprocess.DEVNULL)
         try:
             for line in process.stdout:
@@ -97,10 +105,9 @@ def render(runs: list[Run], scene: Path, out: Path, hand: str, seconds: float = 
         return part
 
     with ThreadPoolExecutor(jobs) as pool:
-        pieces = list(pool.map(draw, range(len(parts))))
+        pieces = list(pool.map(draw_part, range(len(parts))))
     progress.show(progress.total)
     join(pieces, out)
-    return out
 
 
 def join(pieces: list[Path], out: Path) -> None:

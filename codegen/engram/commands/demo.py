@@ -1,4 +1,4 @@
-"""Run the controller against the simulated robot, with and without memory: log, video, report, summary."""
+"""Run the deployed controller against a simulated robot over LCM: log, video, report, summary."""
 
 import argparse
 from pathlib import Path
@@ -8,6 +8,8 @@ from engram.paths import BUILD
 EXAMPLES = """examples:
   engram demo                                 300 jumps of the Panda in each mode, into runs/<time>/
   engram demo --seed 7 --jumps 60             another, shorter series
+  engram demo --robot talos                   Talos stands, squats and takes pushes
+  engram demo --robot hector --jumps 10       a quadrotor visits ten way points in the wind
   engram demo --modes memory --clock wall     real time instead of lock step
 """
 
@@ -16,9 +18,9 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     """Arguments of `engram demo`."""
     parser = subparsers.add_parser("demo", help=__doc__, description=__doc__, epilog=EXAMPLES)
     parser.add_argument("--robot", default="panda", help="robot to run (default: panda)")
-    parser.add_argument("--task", default="reach", help="task to run (default: reach)")
+    parser.add_argument("--task", help="task to run (default: the robot's only one)")
     parser.add_argument("--seed", type=int, default=1, help="of the task series; none repeats the training data (default: 1)")
-    parser.add_argument("--jumps", type=int, default=300, help="jumps of the target (default: 300)")
+    parser.add_argument("--jumps", type=int, help="jumps, way points or episodes (default: 300 jumps, or all)")
     parser.add_argument(
         "--modes", default="memory,line,shift,cold", help="what may seed the solver (default: memory,line,shift,cold)"
     )
