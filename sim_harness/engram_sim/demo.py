@@ -15,7 +15,7 @@ from engram.tasks.scene import write_shown_scene
 from engram.tasks.spec import known_tasks, load_task, open_task
 from engram_sim import motion_demo, report, suboptimality, video
 from engram_sim.motion import Motion
-from engram_sim.pair import Pair, Progress, private_port, scene
+from engram_sim.pair import Pair, Progress, plant_option, private_port, scene
 from engram_sim.results import MODES, Run, figures, figures_name, read_run, read_runs
 from engram_sim.series import write_reach
 
@@ -29,7 +29,9 @@ def demo(args: argparse.Namespace) -> int:
     """Run `engram demo`; arguments as its parser has them."""
     if args.robot not in known_robots():
         raise InputError(f"unknown robot '{args.robot}'; {closest(args.robot, known_robots())}")
-    args.task = args.task or next(iter(known_tasks(args.robot)), "")
+    if not known_tasks(args.robot):
+        raise InputError(f"robot '{args.robot}' has no task; write models/{args.robot}/<task>/task.toml")
+    args.task = args.task or known_tasks(args.robot)[0]
     if open_task(args.robot, args.task).data["kind"] == "reach":
         return reach_demo(args)
     return motion_demo.demo(args, run_folder(args.out))
@@ -99,14 +101,6 @@ def run_modes(args: argparse.Namespace, modes: list[str], folder: Path, series: 
     order = [mode for mode in SLOWEST_FIRST if mode in modes]
     with ThreadPoolExecutor(max(1, args.jobs)) as pool:
         return dict(zip(order, pool.map(run_mode, order)))
-
-
-def plant_option(text: str) -> list[str]:
-    """noise-v=0.01 -> --noise-v 0.01"""
-    name, equal, value = text.partition("=")
-    if not equal:
-        raise InputError(f"--plant-option {text}: the form is OPTION=VALUE; `engram-plant --help` lists the options")
-    return [f"--{name.lstrip('-')}", value]
 
 
 def point_latest(folder: Path) -> None:

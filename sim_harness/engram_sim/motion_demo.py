@@ -14,7 +14,7 @@ from engram.tasks.motion import load_motion
 from engram.tasks.scene import write_shown_scene
 from engram_sim import motion_report, scenarios, video
 from engram_sim.motion import Motion
-from engram_sim.pair import Pair, Progress, private_port, scene
+from engram_sim.pair import Pair, Progress, plant_option, private_port, scene
 from engram_sim.results import Run, read_run, wilson
 
 MODE = "shift"  # what seeds the solver: the shifted plan
@@ -26,6 +26,8 @@ PERCENTILES = ("p50", "p99", "p99.9", "max")
 def demo(args: argparse.Namespace, folder: Path) -> int:
     """Run the motion's script into `folder`; arguments as the parser of `engram demo` has them."""
     start = time.monotonic()
+    if args.jumps is not None and args.jumps < 1:
+        raise InputError("--jumps: at least one way point or episode")
     spec = load_motion(args.robot, args.task)
     script = scenarios.script(spec, args.seed, args.jumps)
     path = folder / f"{script.kind}.txt"
@@ -40,7 +42,7 @@ def demo(args: argparse.Namespace, folder: Path) -> int:
 
     pair = Pair(folder / MODE, path, scene(args.robot, args.task), private_port(), MODE, f"{args.robot}_{args.task}", script.kind)
     pair.clock, pair.controller = args.clock, args.controller
-    options = [word for option in args.plant_option for word in option]
+    options = [word for option in args.plant_option for word in plant_option(option)]
     pair.plant_options = ["--log-full", str(LOG_FULL), "--log-every", str(LOG_EVERY), *script.plant_options, *options]
     code = pair.run(ended)
     if code != 0:
@@ -78,11 +80,18 @@ def finish(folder: Path, header: dict[str, Any], seconds: float, figures_folder:
     motion = Motion(run, spec.robot, header["site"])
     page = motion_report.write(folder, motion, parts(run), summary, drawn if drawn.is_file() else None)
     print_summary(summary, run)
+    print(f"said    {last_line(run.folder / 'controller.txt')}")
     print(f"report  {relative(page)}")
     if drawn.is_file():
         print(f"video   {relative(drawn)}")
     print(f"log     {relative(run.log)}   (engram replay, lcm-logplayer)")
     return 0 if summary["successes"] == summary["parts"] else 1
+
+
+def last_line(path: Path) -> str:
+    """How the controller ended: its tally of cycles, rungs and troubles."""
+    lines = path.read_text(encoding="utf-8", errors="replace").splitlines() if path.is_file() else []
+    return lines[-1] if lines else "nothing"
 
 
 def parts(run: Run) -> list[dict[str, Any]]:

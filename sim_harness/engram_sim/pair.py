@@ -41,6 +41,14 @@ def scene(robot: str, task: str) -> Path:
     return TABLES / f"{robot}_{task}" / "scene.xml"
 
 
+def plant_option(text: str) -> list[str]:
+    """noise-v=0.01 -> --noise-v 0.01"""
+    name, equal, value = text.partition("=")
+    if not equal:
+        raise InputError(f"--plant-option {text}: the form is OPTION=VALUE; `engram-plant --help` lists the options")
+    return [f"--{name.lstrip('-')}", value]
+
+
 @dataclass
 class Pair:
     """One run: how plant and controller are called and where they write.

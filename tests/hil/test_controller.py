@@ -109,7 +109,10 @@ def end(child: subprocess.Popen, sig: int = signal.SIGINT) -> str:
 
 def test_help_and_version_tell(build: Path) -> None:
     said = subprocess.run([program("engram-controller"), "--help"], capture_output=True, text=True, check=True).stdout
-    for word in ("--clock", "--memory", "lockstep", "ENGRAM_STATE", "Exit codes"):
+    header = (build.parent / "controller/engram.h").read_text(encoding="utf-8")
+    models = re.findall(r"extern const engram_model engram_(\w+);", header)
+    assert "panda_reach" in models and "talos_stand" in models
+    for word in ("--clock", "--memory", "lockstep", "ENGRAM_STATE", "Exit codes", *models):
         assert word in said
     version = subprocess.run([program("engram-controller"), "--version"], capture_output=True, text=True, check=True).stdout
     assert re.fullmatch(r"engram-controller \d+\.\d+\.\d+\n", version)
