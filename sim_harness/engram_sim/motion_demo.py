@@ -20,7 +20,7 @@ from engram_sim.results import Run, read_run, wilson
 MODE = "shift"  # what seeds the solver: the shifted plan
 LOG_EVERY = 40  # plant steps between two states of the log
 LOG_FULL = 10.0  # s of the log with every state
-PERCENTILES = ("p50", "p99", "p99.9", "max")
+PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}
 
 
 def demo(args: argparse.Namespace, folder: Path) -> int:
@@ -125,8 +125,7 @@ def summarize(run: Run) -> dict[str, Any]:
     for phase in ("query", "linearize", "backward", "rollout", "total"):
         values = run.timing.get(f"{phase}_us", np.array([]))
         if len(values):
-            shares = (float(np.percentile(values, q)) for q in (50, 99, 99.9, 100))
-            row[f"{phase}_us"] = dict(zip(PERCENTILES, shares)) | {"n": len(values)}
+            row[f"{phase}_us"] = {kind: float(np.percentile(values, q)) for kind, q in PERCENTILES.items()} | {"n": len(values)}
     return row
 
 

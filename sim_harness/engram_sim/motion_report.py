@@ -43,7 +43,7 @@ def table(done: list[dict[str, Any]]) -> list[list[str]]:
 
 def times_table(summary: dict[str, Any]) -> str:
     """CPU time of a cycle by phase."""
-    rows = [["phase (ms of CPU time)", "p50", "p99", "p99.9", "max"]]
+    rows = [["phase (ms of CPU time)", "p50", "p99", "p999", "max"]]
     for phase in PHASES:
         times = summary.get(f"{phase}_us")
         if times and times["max"] > 0.0:
