@@ -96,6 +96,7 @@ template <class C> class LeggedModel {
   int64_t origin_ = 0, taken_ = 0, before_taken_ = 0;  // us: slot 0; when they came
   double z_ = 0.0;               // height of the centre of mass at home above the feet [m]
   double com_[2] = {};           // reference at the slot under way [m]
+  double push_[2] = {};          // by which footholds move [m], world axes
   double reference_[2][kWindow]; // centre of mass from there on [m]
   double ground_ = 0.0;          // height of the feet [m]
   double q_[R::nq];              // measured or expected
@@ -151,7 +152,10 @@ template <class C> void LeggedModel<C>::begin(int64_t utime, const double* x) {
   const Mat3<double> R_WB = rotation_of(x + 3);
   body.yaw = std::atan2(R_WB(1, 0), R_WB(0, 0));
   gait_.begin(0, feet_, body);
-  for (int i = 0; i < 2; ++i) com_[i] = body.p[i];
+  for (int i = 0; i < 2; ++i) {
+    com_[i] = body.p[i];
+    push_[i] = 0.0;
+  }
   origin_ = taken_ = before_taken_ = utime;
   now_ = before_ = LeggedCommand{};
 }
@@ -193,15 +197,18 @@ template <class C> void LeggedModel<C>::pendulum() {
   }
 }
 
-// Footholds, phases and centre of mass of the window. Footholds move with the capture point: where the pendulum would come to rest.
+// Footholds, phases and centre of mass of the window. Footholds move with the error of the capture point, where the pendulum would come
+// to rest, as fast and as far as a foot can follow that swings already.
 template <class C> void LeggedModel<C>::replan() {
-  double push[2] = {};
   const double rest = std::sqrt(z_ / 9.81);  // s
-  for (int i = 0; i < 2 && gait_.walking(); ++i) {
+  const double step = Task::gait_push_rate * 1e-6 * kTickUs;
+  for (int i = 0; i < 2; ++i) {
     const double c0 = reference_[i][0], v = (reference_[i][1] - c0) / kStep;
-    push[i] = Task::gait_capture * (seen_com_[i] - com_[i] + rest * (seen_velocity_[i] - v));
+    const double error = gait_.walking() ? seen_com_[i] - com_[i] + rest * (seen_velocity_[i] - v) : 0.0;
+    const double wanted = std::clamp(Task::gait_capture * error, -Task::gait_push_reach, Task::gait_push_reach);
+    push_[i] = std::clamp(wanted, push_[i] - step, push_[i] + step);
   }
-  gait_.plan(now_.pace, kWindow, push);
+  gait_.plan(now_.pace, kWindow, push_);
   pendulum();
 }
 

@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct AnymalTrot {
   using Robot = robots::Anymal;
   static constexpr char name[] = "anymal_trot";
-  static constexpr uint64_t digest = 0xa4b77e8359eb09ef;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x77545358ef2a7eaa;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 4;
@@ -35,14 +35,14 @@ struct AnymalTrot {
   static constexpr double dt = 0x1.47ae147ae147bp-6;  // 0.02 s
 
   // <table>_<key> of task.toml
-  static constexpr double weights_orientation = 0x1.f4p+10;  // 2000
+  static constexpr double weights_orientation = 0x1.f4p+9;  // 1000
   static constexpr double weights_posture[2] = {0x1p+0, 0.0};  // 1, 0
   static constexpr double weights_base_velocity = 0x1.ep+4;  // 30
   static constexpr double weights_velocity[2] = {0x1p-1, 0.0};  // 0.5, 0
-  static constexpr double weights_com[3] = {0x1.f4p+10, 0x1.f4p+10, 0x1.388p+13};  // 2000, 2000, 10000
+  static constexpr double weights_com[3] = {0x1.f4p+8, 0x1.f4p+8, 0x1.388p+13};  // 500, 500, 10000
   static constexpr double weights_torque = 0x1.0624dd2f1a9fcp-10;  // 0.001
   static constexpr double weights_torque_scale = 0x1.4p+6;  // 80
-  static constexpr double weights_cone = 0x1p+0;  // 1
+  static constexpr double weights_cone = 0x1.3333333333333p-2;  // 0.3
   static constexpr double weights_limit_q = 0.0;  // 0
   static constexpr double weights_terminal = 0x1.3333333333333p-2;  // 0.3
   static constexpr double weights_terminal_velocity = 0x1p+0;  // 1
@@ -53,7 +53,9 @@ struct AnymalTrot {
   static constexpr double gait_height = 0x1.eb851eb851eb8p-5;  // 0.06
   static constexpr double gait_swing_weight = 0x1.86ap+16;  // 100000
   static constexpr double gait_landing = 0x1.ep+4;  // 30
-  static constexpr double gait_capture = 0x1p-1;  // 0.5
+  static constexpr double gait_capture = 0x1p+0;  // 1
+  static constexpr double gait_push_rate = 0x1.8p+0;  // 1.5
+  static constexpr double gait_push_reach = 0x1p-2;  // 0.25
 
   // obstacles: centre, axes and half sizes [m]
   static constexpr int nbox = 0;

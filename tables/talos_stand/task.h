@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct TalosStand {
   using Robot = robots::Talos;
   static constexpr char name[] = "talos_stand";
-  static constexpr uint64_t digest = 0x392337bb423c3387;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x155acfdc6bf32e0e;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 3;
@@ -49,6 +49,8 @@ struct TalosStand {
   static constexpr double gait_swing_weight = 0.0;  // 0
   static constexpr double gait_landing = 0.0;  // 0
   static constexpr double gait_capture = 0.0;  // 0
+  static constexpr double gait_push_rate = 0.0;  // 0
+  static constexpr double gait_push_reach = 0.0;  // 0
 
   // obstacles: centre, axes and half sizes [m]
   static constexpr int nbox = 0;

@@ -70,6 +70,7 @@ def prove(seed: int, quick: bool, cycles: int, jobs: int) -> Report:
     runs = run_trials(grid, jobs, "pushes")
     share = np.mean([run.stays for run in runs])
     report.add("push.taken", share, "1", len(runs), f"20 +x, 24 -x, 28 +-y N s at {len(headings)} headings", share == 1.0)
+    report.add("push.slip", 1e3 * max(run["slip"].max() for run in runs), "mm", len(runs))
     if not quick:
         program = [BUILD / "bin" / "engram-trial", MODEL, "limits"]
         limits = map(float, subprocess.run(program, capture_output=True, check=True, text=True).stdout.split())
