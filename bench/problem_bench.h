@@ -129,6 +129,20 @@ template <class P> void report_flops(const Problem<P>& problem, Report& report) 
   report.number("flops_solve1", linearize + backward + forward);
 }
 
+// Bytes that the phases move between memory and processor at least once, over the horizon: what a knot leaves for the next phase and what
+// that reads of it; the scratch stays in the caches.
+template <class P> void report_bytes(int knots, Report& report) {
+  constexpr double model = sizeof(typename P::LqModel), gains = sizeof(double) * P::nu * P::Layout::nxp;
+  constexpr double parameters = sizeof(typename P::template Knot<double>), point = sizeof(double) * (P::nx + P::nu);
+  constexpr double vectors = sizeof(double) * (2.0 * P::Layout::nxp + P::Layout::nup);  // f, Vf, k
+  const double calcdiff = knots * (parameters + point + model), backward = knots * (model + gains + vectors);
+  const double forward = knots * (parameters + point + gains + vectors + kLanes * point);
+  report.number("bytes_calcdiff", calcdiff);
+  report.number("bytes_backward", backward);
+  report.number("bytes_forward", forward);
+  report.number("bytes_solve1", calcdiff + backward + forward);
+}
+
 template <class P> void compare(Problem<P>& problem, const std::vector<double>& trajectory) {
   using L = typename P::Layout;
   auto& [h, w, s, stats] = problem;
@@ -171,6 +185,8 @@ template <class P> void compare(Problem<P>& problem, const std::vector<double>& 
   report.number("iterations", stats.iterations);
   report.number("cost_converged", s.cost);
   report_flops(problem, report);
+  report_bytes<P>(h.n, report);
+  report.number("memory", sizeof(problem));
   report.list("xs_converged", s.x[0], (n + 1) * P::nx);
   report.list("us_converged", flat_controls(h, s));
 }

@@ -49,6 +49,7 @@ PROBLEMS = {
     "anymal": Anchor("anymal", 56, 12, (27, 55), derivatives=1e-8),  # K: two point feet leave Quu ill-conditioned
     "quad33": Anchor("hector", 33, 4),
 }
+ROBOTS = ("panda", "talos")
 PHASES = ("solve1", "calcdiff", "backward", "forward")
 LINEARIZATION = ("cost", "gap", "Fx", "Fu", "Lx", "Lu", "Lxx", "Lxu", "Luu", "K", "k")
 RIGID_BODY = ("fk", "rnea", "aba", "crba", "rnea_derivatives", "aba_derivatives")
@@ -217,6 +218,19 @@ class Bench:
         for phase in PHASES:
             self.figures.add(name, phase, mine[phase], peer[phase], holds, ours.get(f"flops_{phase}"))
         print(f"  solve1 per knot: {mine['solve1'].median / T:.2f} us, peer {peer['solve1'].median / T:.2f} us")
+        self.roofline(name, ours, mine)
+
+    def roofline(self, name: str, ours: dict, times: dict[str, Samples]) -> None:
+        """How far the machine's limits are: the time of the flops at the rate of a matrix product, and the traffic."""
+        print(f"  up to 100 knots take {ours['memory'] / 1e6:.2f} MB; a matrix product, {self.gemm_rate:.0f} GFLOP/s")
+        for phase in PHASES:
+            flops, size, us = ours[f"flops_{phase}"], ours[f"bytes_{phase}"], times[phase].median
+            limit = flops / self.gemm_rate * 1e-3
+            work = f"{flops * 1e-6:8.3f} MFLOP = {limit:8.1f} us at that rate, {limit / us:4.0%} of our time"
+            print(f"    {phase:<10} {work}; {size * 1e-6:7.3f} MB streamed, {size / us * 1e-3:5.1f} GB/s")
+            self.figures.rows.append(
+                {"id": f"bench.{name}.{phase}.of_limit", "value": limit / us, "unit": "1", "n": 1, "gate": True}
+            )
 
     def rigid_body(self, robot: str) -> None:
         from export_models import load
@@ -312,24 +326,28 @@ class Bench:
         self.figures.rows += [
             {"id": f"bench.gemm.{side}", "value": value, "unit": "GFLOP/s", "n": 50, "gate": True} for side, value in rate.items()
         ]
-        ours, native = rate["ours"], rate["native"]
-        print(f"\nmatrix product (Eigen, double): {ours:.0f} GFLOP/s under our flags, {native:.0f} with -march=native")
+        self.gemm_rate, native = rate["ours"], rate["native"]
+        print(f"matrix product (Eigen, double): {self.gemm_rate:.0f} GFLOP/s under our flags, {native:.0f} with -march=native")
 
 
 def main() -> int:
+    parts = [*PROBLEMS, *ROBOTS, "memory"]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=Path, default=ROOT / "build", help="build folder (default: build)")
     parser.add_argument("--rounds", type=int, default=7, help="how often the two sides alternate (default: 7)")
     parser.add_argument("-n", type=int, default=300, help="samples per round of the smallest problem (default: 300)")
-    parser.add_argument("--only", nargs="+", choices=list(PROBLEMS), metavar="PROBLEM", help=f"of {', '.join(PROBLEMS)}")
+    parser.add_argument("--only", nargs="+", choices=parts, metavar="PART", help=f"of {', '.join(parts)}")
     args = parser.parse_args()
     bench = Bench(args.build.resolve(), args.rounds, args.n)
-    for name in args.only or PROBLEMS:
-        bench.problem(name)
-    bench.rigid_body("panda")
-    bench.queries()
-    bench.learners()
     bench.gemm()
+    only = args.only or parts
+    for name in (name for name in PROBLEMS if name in only):
+        bench.problem(name)
+    for robot in (robot for robot in ROBOTS if robot in only):
+        bench.rigid_body(robot)
+    if "memory" in only:
+        bench.queries()
+        bench.learners()
     out = args.build / "figures" / "bench.json"
     bench.figures.write(out)
     print(f"\nwrote {out}")

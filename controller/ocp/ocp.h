@@ -102,7 +102,8 @@ template <class R_, class... Terms> struct Ocp {
         if constexpr (Actuation<R>::kDrivesDofs) {
           M.D[i][Layout::ou + j] = knot.dt * Minv(i, Actuation<R>::dof(j));
         } else {
-          for (int k = 0; k < nv; ++k) M.D[i][Layout::ou + j] += knot.dt * Minv(i, k) * S(Actuation<R>::entry(k, j));
+          for (int k = 0; k < nv; ++k)
+            if (Actuation<R>::entry(k, j) != 0.0) M.D[i][Layout::ou + j] += knot.dt * Minv(i, k) * S(Actuation<R>::entry(k, j));
         }
       }
     }

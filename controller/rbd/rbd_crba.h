@@ -25,13 +25,43 @@ template <class R, class S> inline void rbd_crba_lower(const RbdData<R, S>& d, B
   }
 }
 
-// M (nv x nv), symmetric, armature included. After rbd_kinematics; overwrites d.Y, d.Yc.
+// The same for one state, as many ancestors at once as a Pack holds. In depth-first order the ancestors of dof k are what a stack holds
+// up to its depth: path[row][depth] is entry `row` of their columns of J.
+template <class R> inline void rbd_crba_lower(const RbdData<R, double>& d, BranchMatrix<R, double>& M) {
+  constexpr const Tree<R>& tree = kTree<R>;
+  double path[6][R::nv + kLanes] = {};  // beyond the depth: whatever, but numbers
+  for (int k = 0; k < R::nv; ++k) {
+    const Motion<double>& J = d.J[k];
+    const Force<double> F = d.Yc[tree.joint[k]] * J;
+    double* const row = M.below + tree.first[k];
+    M.diagonal[k] = dot(J, F) + R::armature[k];
+    for (int a = 0; a < tree.depth[k]; a += kLanes) {  // what runs over the end of a row, the next one overwrites
+      const auto part = [&](int r) { return load_pack(path[r] + a); };
+      const Motion<Pack> columns = {{part(0), part(1), part(2)}, {part(3), part(4), part(5)}};
+      const Force<Pack> force = {{F.lin[0], F.lin[1], F.lin[2]}, {F.ang[0], F.ang[1], F.ang[2]}};
+      store_pack(dot(columns, force), row + a);
+    }
+    for (int r = 0; r < 3; ++r) {
+      path[r][tree.depth[k]] = J.lin[r];
+      path[3 + r][tree.depth[k]] = J.ang[r];
+    }
+  }
+}
+
+// The same from the placements alone. After rbd_kinematics; overwrites d.Yc.
+template <class R, class S> inline void rbd_crba_branches(RbdData<R, S>& d, BranchMatrix<R, S>& M) {
+  for (int i = 0; i < R::nj; ++i) d.Yc[i] = inertia_in_world(d.R_WJ[i], d.p_WJ[i], R::mass[i], R::com[i], R::inertia[i]);
+  for (int i = R::nj - 1; i >= 0; --i) {
+    if (const int p = R::parent[i]; p >= 0) d.Yc[p] += d.Yc[i];
+  }
+  rbd_crba_lower(d, M);
+}
+
+// M (nv x nv), symmetric, armature included. After rbd_kinematics; overwrites d.Yc.
 template <class R, class S> inline void rbd_crba(RbdData<R, S>& d, Mat<S, R::nv, R::nv>& M) {
   constexpr const Tree<R>& tree = kTree<R>;
   BranchMatrix<R, S> lower;
-  rbd_inertias(d);
-  rbd_composite_inertias(d);
-  rbd_crba_lower(d, lower);
+  rbd_crba_branches(d, lower);
   M.setZero();
   for (int k = 0; k < R::nv; ++k) {
     M(k, k) = lower.diagonal[k];

@@ -68,7 +68,7 @@ template <class R> inline constexpr Tree<R> kTree{};
 // A lower triangular matrix over the dofs whose entries (k, j) vanish unless j is k or an ancestor of k.
 template <class R, class S> struct BranchMatrix {
   S diagonal[R::nv];
-  S below[branch_pairs<R>()];  // entry (k, j) at first[k] + depth[j]: a row is contiguous, root first
+  S below[branch_pairs<R>() + kLanes];  // entry (k, j) at first[k] + depth[j]: a row is contiguous, root first; room to run over
 
   const S& operator()(int k, int j) const { return below[kTree<R>.first[k] + kTree<R>.depth[j]]; }  // j an ancestor of k
 };

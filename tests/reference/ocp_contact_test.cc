@@ -1,6 +1,8 @@
 // Contacts and impacts: the equations of motion, every derivative against central differences, phases and lanes.
 #include "bench/legged_problems.h"
 #include "controller/fddp/fddp_solve.h"
+#include "tests/support/count_heap.h"
+#include "tests/support/figures.h"
 
 #include <gtest/gtest.h>
 
@@ -295,15 +297,19 @@ TEST(OcpContact, LanesDoNotMix) {
     for (int j = 0; j <= i; ++j) EXPECT_EQ(a->Hqq[i][j], b->Hqq[i][j]);
 }
 
+constexpr int kTalosKnots = 100;  // at most
+template <class P> struct TalosMemory {
+  Horizon<P, kTalosKnots> h;
+  FddpWork<P, kTalosKnots> w;
+  FddpSolution<P, kTalosKnots> s;
+};
+template <class P> TalosMemory<P> talos_memory;
+
 // A state that is not a number ends as a status.
 TEST(OcpContact, NotANumberStateIsRefused) {
-  constexpr int N = 30;
-  using P = TalosThesis;
-  static Horizon<P, N> h;
-  static FddpWork<P, N> w;
-  static FddpSolution<P, N> s;
+  auto& [h, w, s] = talos_memory<TalosThesis>;
   static FddpStats stats;
-  TalosWalk<P, N>(N, 1, 0.3, h);
+  TalosWalk<TalosThesis, kTalosKnots>(30, 1, 0.3, h);
   legged_cold_start(h, s);
   s.x[3][5] = std::nan("");
   EXPECT_EQ(fddp_solve(h, FddpOpts{}, w, s, stats), FddpStatus::kNotFinite);
@@ -312,22 +318,38 @@ TEST(OcpContact, NotANumberStateIsRefused) {
 // The anchors: iterations and cost of Crocoddyl 3.2.1 on the same problems (bench/run.py re-measures them).
 template <class P, int N> void check_anchor(const Horizon<P, N>& h, FddpWork<P, N>& w, FddpSolution<P, N>& s, int iterations, double cost) {
   FddpStats stats;
-  EXPECT_EQ(fddp_solve(h, FddpOpts{}, w, s, stats), FddpStatus::kConverged);
+  calls = 0;
+  counting = true;
+  const FddpStatus status = fddp_solve(h, FddpOpts{}, w, s, stats);
+  counting = false;
+  EXPECT_EQ(calls, 0) << "calls of an allocator";
+  EXPECT_EQ(status, FddpStatus::kConverged);
   EXPECT_NEAR(stats.iterations, iterations, 1);
   EXPECT_NEAR(s.cost, cost, 1e-7 * cost);  // both stop on an expected improvement below 1e-9
 }
 template <class P> void check_talos(int iterations, double cost) {
-  constexpr int N = 30;
-  static Horizon<P, N> h;
-  static FddpWork<P, N> w;
-  static FddpSolution<P, N> s;
-  TalosWalk<P, N>(N, 1, 0.3, h);
+  auto& [h, w, s] = talos_memory<P>;
+  TalosWalk<P, kTalosKnots>(30, 1, 0.3, h);
   legged_cold_start(h, s);
   check_anchor(h, w, s, iterations, cost);
 }
 TEST(OcpContact, TalosStepsLikeThePeer) {
   check_talos<TalosThesis>(9, 1126.532839);
   check_talos<TalosUtils>(14, 1832.276072);
+}
+TEST(OcpContact, TheCounterSeesAnAllocation) {
+  calls = 0;
+  counting = true;
+  int* volatile planted = new int(1);
+  delete planted;
+  counting = false;
+  EXPECT_EQ(calls, 2);
+}
+// Horizon, scratch and solution of Talos with 100 knots (Crocoddyl: about 400 MB of heap).
+TEST(OcpContact, TalosFitsIntoItsMemory) {
+  constexpr long long bytes = sizeof(TalosMemory<TalosUtils>);
+  test::write_figure("memory", "size.talos100.solver_bytes", bytes, "B", 1);
+  EXPECT_LT(bytes, 16'000'000);
 }
 TEST(OcpContact, AnymalTrotsLikeThePeer) {
   static Horizon<AnymalProblem, kTrotKnots> h;
