@@ -36,11 +36,12 @@ template <class M> class Guesses {
     stand_still(x0, own_);
     add(ENGRAM_CANDIDATE_COLD, own_);
   }
-  // What the memory proposes; the straight lines alone, unless `remember`.
-  void ask_memory(const typename M::Target& target, bool remember, const double* x0, const int64_t (&utime)[N + 1]) {
+  // What the memory proposes; the straight lines alone, unless `remember`. Another `elsewhere` than 0 makes one of them another line.
+  void ask_memory(const typename M::Target& target, bool remember, int64_t elsewhere, const double* x0,
+                  const int64_t (&utime)[N + 1]) {
     double t[N + 1];
     for (int k = 0; k <= N; ++k) t[k] = 1e-6 * static_cast<double>(utime[k] - utime[0]);
-    n = memory_.guesses(target, remember, x0, N, t, candidate, n);
+    n = memory_.guesses(target, remember, elsewhere, x0, N, t, candidate, n);
   }
   void compare(const Horizon<P, N>& horizon) { loop_merit(horizon, candidate, n); }
 

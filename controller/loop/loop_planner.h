@@ -17,7 +17,9 @@
 
 namespace engram {
 
-inline constexpr double kAstray = 0.9;  // share of what counts as success, beyond which the plan under way misses its target
+// Share of what counts as success, beyond which the plan under way misses its target. The hand comes to rest further off than the
+// plan ends, where the weight of the pose is larger than on the way.
+inline constexpr double kAstray = 0.5;
 inline constexpr int kRivals = 5;       // guesses that are tried in turn while the plan does not end at the target
 
 template <class M> class Planner : public PlannerCore<M, Planner<M>> {
@@ -41,8 +43,8 @@ template <class M> class Planner : public PlannerCore<M, Planner<M>> {
     double score, reg;
   };
 
-  void collect(bool postponed, const Deadline& deadline);
-  bool search(bool waiting, Deadline& deadline);
+  void collect(bool postponed, bool stuck, const Deadline& deadline);
+  bool search(bool waiting, bool astray, Deadline& deadline);
   double score(double nearest) const;
   double nearest_allowed() const;
   void record_start(const Candidate<P>& guess);
@@ -53,8 +55,8 @@ template <class M> class Planner : public PlannerCore<M, Planner<M>> {
   Result best_;
 };
 
-// The guesses for the posed problem, and their merits.
-template <class M> void Planner<M>::collect(bool postponed, const Deadline& deadline) {
+// The guesses for the posed problem, and their merits. While the robot is `stuck`, every period has one line to somewhere else.
+template <class M> void Planner<M>::collect(bool postponed, bool stuck, const Deadline& deadline) {
   const double begin = deadline.now();
   const double* const x0 = solve_.horizon.x0;
   const bool cold = options_.memory == ENGRAM_MODE_COLD && jumped_;
@@ -62,7 +64,8 @@ template <class M> void Planner<M>::collect(bool postponed, const Deadline& dead
   if (!cold && !jumped_ && postponed) guesses_.add_postponed(solve_.plan, x0);
   if (guesses_.n == 0) guesses_.add_standing_still(x0);
   if (options_.memory == ENGRAM_MODE_MEMORY || options_.memory == ENGRAM_MODE_LINE) {
-    guesses_.ask_memory(task_.target, options_.memory == ENGRAM_MODE_MEMORY && task_.known, x0, solve_.plan.utime);
+    const bool remember = options_.memory == ENGRAM_MODE_MEMORY && task_.known;
+    guesses_.ask_memory(task_.target, remember, stuck ? seq_ + 1 : 0, x0, solve_.plan.utime);
   }
   const double asked = deadline.now();
   guesses_.compare(solve_.horizon);
@@ -106,14 +109,13 @@ template <class M> double Planner<M>::score(double nearest) const {
 }
 
 // Iterates from the best guess; while the robot waits for a plan, from others too that end elsewhere; and while the plan does not end
-// at the target, from one such other in turn. Readies the best result. False if all solves failed.
-template <class M> bool Planner<M>::search(bool waiting, Deadline& deadline) {
-  const bool astray = !waiting && !M::arrived(task_.target, plan_.s.x[N], kAstray);
+// at the target (`astray`), from one such other in turn. Readies the best result. False if all solves failed.
+template <class M> bool Planner<M>::search(bool waiting, bool astray, Deadline& deadline) {
   const int starts = waiting ? options_.starts : astray ? 2 : 1;
   const double resumed_reg = solve_.reg(), nearest = nearest_allowed();
   best_.score = HUGE_VAL;
   for (int s = 0; s < starts && (s == 0 || !deadline.late()); ++s) {
-    const int rank = astray ? static_cast<int>(seq_ % kRivals) : 0;
+    const int rank = jumped_ ? 0 : static_cast<int>(seq_ % kRivals);
     const Candidate<P>* const guess = s == 0 ? guesses_.best(jumped_ ? 0.0 : options_.switch_gain) : guesses_.another(rank);
     if (guess == nullptr) break;
     if (s == 0) cycle_.winner = guess->kind;
@@ -154,8 +156,10 @@ template <class M> engram_status Planner<M>::prepare(int64_t utime) {
   const bool fresh = jumped_ || plan_.n == 0 || postponed;  // whole knots from utime on
   predict(plan_, watch_, utime, solve_.horizon.x0);
   solve_.pose(task_.target, jump_utime_, utime, fresh ? utime : plan_.utime[1]);
-  collect(postponed, deadline);
-  if (search(fresh || plan_jump_ != task_.jump, deadline)) {
+  const bool waiting = fresh || plan_jump_ != task_.jump;
+  const bool astray = !waiting && !M::arrived(task_.target, plan_.s.x[N], kAstray);
+  collect(postponed, (waiting && !jumped_) || astray, deadline);
+  if (search(waiting, astray, deadline)) {
     trial_ = Trial::kReady;
     if (deadline.late()) ending_ = ENGRAM_DEADLINE;
   }

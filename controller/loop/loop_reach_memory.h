@@ -29,11 +29,12 @@ template <class Task, const MemoryTables& tables> struct ReachMemory {
     return digest;
   }
 
-  // Appends the guesses (the straight lines alone, unless `remember`) for the state x0 on N + 1 knot times t [s] to the n candidates;
+  // Appends the guesses (the straight lines alone, unless `remember`; `elsewhere`: as in MemoryOpts) for the state x0 on N + 1 knot times t [s] to the n candidates;
   // returns their new number.
-  template <class P> int guesses(const ReachTarget& target, bool remember, const double* x0, int N, const double* t,
+  template <class P> int guesses(const ReachTarget& target, bool remember, int64_t elsewhere, const double* x0, int N, const double* t,
                                  Candidate<P>* candidates, int n) {
     MemoryOpts opts;
+    opts.elsewhere = elsewhere;
     if (!remember) {
       opts.neighbours = 0;
       opts.regression = false;

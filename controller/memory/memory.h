@@ -41,7 +41,7 @@ enum class GuessKind : int32_t { kNeighbour, kRegression, kLine };
 
 inline constexpr int kMemoryPool = 24;       // samples looked up; those whose end cannot be corrected make room for the next
 inline constexpr int kMemoryNeighbours = 8;  // most neighbours of an answer
-inline constexpr int kMemoryLines = 3;       // to the end of the best neighbour, to one found from home, to one found from here
+inline constexpr int kMemoryLines = 3;       // to the end of the best neighbour, to one found from home, to one found from here (or elsewhere)
 inline constexpr int kMemoryGuesses = kMemoryNeighbours + 2 * kMemoryLines;
 
 struct MemoryOpts {
@@ -49,6 +49,7 @@ struct MemoryOpts {
   int lines = kMemoryLines;            // 0 .. kMemoryLines; the first needs neighbours
   bool regression = true;              // a regression beside every line
   bool recall_controls = false;        // closer to the solver's controls, but no longer a motion: it opens gaps (docs/memory.md)
+  int64_t elsewhere = 0;               // not 0: the last line's end is found from the posture of this random draw, not from here
   double max_warp = 1.2;               // [rad] a neighbour whose end must turn a joint further is refused
 };
 

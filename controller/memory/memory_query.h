@@ -5,6 +5,7 @@
 #include "controller/ik/ik_pose.h"
 #include "controller/memory/memory_features.h"
 #include "controller/memory/memory_warp.h"
+#include "controller/tab/tab_random.h"
 
 #include <cmath>
 
@@ -125,7 +126,10 @@ int find_lines(const MemoryTables& tables, const MemoryOpts& opts, const ReachTa
   for (int source = slots > 0 ? 0 : 1; source < opts.lines; ++source) {
     const double* const start = source == 0 ? w.slot[0].end : source == 1 ? R::q_home : x0;
     auto& slot = add(w, slots, GuessKind::kLine, source, nullptr, answer.distance);
-    for (int i = 0; i < R::nq; ++i) slot.start[i] = start[i];
+    const bool drawn = source == 2 && opts.elsewhere != 0;
+    for (int i = 0; i < R::nq; ++i) {
+      slot.start[i] = drawn ? R::q_lo[i] + (R::q_hi[i] - R::q_lo[i]) * tab_random_uniform(Task::digest, opts.elsewhere, i) : start[i];
+    }
   }
   const int last = slots;
   find_ends(goal, IkOptions{}.iterations, first, last, w);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "controller/loop/loop_controller.h"
+#include "controller/loop/loop_planner.h"
 #include "controller/loop/loop_reach.h"
 #include "tables/panda_reach/task.h"
 #include "tests/support/panda_plant.h"
@@ -23,7 +24,7 @@ struct NonsenseMemory {
   static bool tables_fit() { return true; }
   static uint64_t table_digest() { return 1; }
   template <class P>
-  int guesses(const ReachTarget&, bool, const double* x0, int, const double*, Candidate<P>* candidates, int n) {
+  int guesses(const ReachTarget&, bool, int64_t, const double* x0, int, const double*, Candidate<P>* candidates, int n) {
     constexpr double kBad[kGuesses] = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300,
                                        -1e155};
     for (int g = 0; g < kGuesses; ++g) {
@@ -97,7 +98,7 @@ TEST_F(GuessesTest, NothingFiniteIsNoGuess) {
 }
 
 TEST(Nonsense, OfTheMemoryNeverSeedsTheSolver) {
-  static constexpr engram_model kModel = loop_model<Nonsense>("panda", "nonsense");
+  static constexpr engram_model kModel = loop_model<Nonsense, Planner<Nonsense>>("panda", "nonsense");
   std::vector<unsigned char> memory(engram_sizeof(&kModel));
   engram_controller* handle = nullptr;
   ASSERT_EQ(engram_init(&kModel, memory.data(), memory.size(), nullptr, &handle), ENGRAM_NO_ERROR);

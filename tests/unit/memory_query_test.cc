@@ -200,6 +200,33 @@ TEST(MemoryQuery, RecalledControlsAreAddedToThoseOfTheSameMotion) {
   EXPECT_GT(recalled, 30);
 }
 
+TEST(MemoryQuery, TheLastLineMayEndElsewhere) {
+  const auto end = [](const MemoryAnswer<Task>& answer, int source) {
+    for (int g = 0; g < answer.n; ++g)
+      if (answer.guess[g].kind == GuessKind::kLine && answer.guess[g].source == source) return answer.guess[g].x[N];
+    return static_cast<const double*>(nullptr);
+  };
+  Query here(3), elsewhere(3), again(3);
+  here.ask();
+  int other = 0;
+  for (int64_t draw = 1; draw <= 20; ++draw) {
+    elsewhere.opts.elsewhere = again.opts.elsewhere = draw;
+    elsewhere.ask();
+    again.ask();
+    for (int source = 0; source < kMemoryLines; ++source) {
+      const double *a = end(*here.answer, source), *b = end(*elsewhere.answer, source), *c = end(*again.answer, source);
+      ASSERT_EQ(a == nullptr, b == nullptr);
+      if (a == nullptr) continue;
+      EXPECT_EQ(std::memcmp(b, c, sizeof *b * nq), 0) << "a draw is a function of its number";
+      double most = 0;
+      for (int i = 0; i < nq; ++i) most = std::fmax(most, std::fabs(a[i] - b[i]));
+      if (source == 2) other += most > 0.3;
+      else EXPECT_EQ(most, 0);
+    }
+  }
+  EXPECT_GT(other, 10);  // a random posture leads to another end more often than not
+}
+
 TEST(MemoryQuery, NothingUsableGivesNoGuess) {
   for (double bad : {std::nan(""), static_cast<double>(INFINITY), -static_cast<double>(INFINITY), 1e300, -1e7}) {
     for (int what = 0; what < 4; ++what) {
