@@ -18,8 +18,7 @@ from sklearn.neural_network import MLPRegressor
 
 from engram.emit import Mlp, Sdf, Table
 from engram.engine import engine
-from engram.learn.contenders import mixture_table
-from engram.learn.mixture import Mixture, condition
+from engram.learn.mixture import Mixture, condition, mixture_table
 
 SAMPLES, D, M = 2834, 16, 19  # as the Panda's memory: features of a task -> end posture and leading coefficients
 COMPONENTS, HIDDEN, BOXES = 24, 64, 8

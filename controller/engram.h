@@ -28,7 +28,7 @@ extern "C" {
 #define ENGRAM_NX_MAX 128     // bound on nq + nv of any model
 #define ENGRAM_NTASK_MAX 32   // bound on the length of a task vector
 #define ENGRAM_KNOTS_MAX 64   // bound on the knots of a plan
-#define ENGRAM_GUESSES_MAX 16 // bound on the candidates of one cycle
+#define ENGRAM_GUESSES_MAX 24 // bound on the candidates of one cycle
 
 typedef struct engram_controller engram_controller;  // one controller, living in the caller's memory
 typedef struct engram_model engram_model;            // one robot, task and memory, compiled in; read-only
@@ -115,6 +115,7 @@ typedef enum engram_candidate {
   ENGRAM_CANDIDATE_SHIFTED = 0,  // the last plan, shifted
   ENGRAM_CANDIDATE_KNN,          // a remembered motion, warped to state and goal
   ENGRAM_CANDIDATE_GPR,          // Gaussian process regression
+  ENGRAM_CANDIDATE_GMR,          // a mode of a mixture of motions
   ENGRAM_CANDIDATE_LINE,         // straight line in joint space to an inverse kinematics solution
   ENGRAM_CANDIDATE_COLD,         // stand still under gravity torque
   ENGRAM_CANDIDATE_COUNT

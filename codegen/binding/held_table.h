@@ -24,7 +24,7 @@ class HeldTable {
   HeldTable(const nb::object& source, uint64_t robot_digest, uint64_t task_digest)
       : name_(nb::cast<std::string>(source.attr("role"))) {
     TabHead head{};
-    head.schema = TAB_SCHEMA;
+    head.schema = nb::cast<uint32_t>(source.attr("schema"));
     head.kind = nb::cast<uint32_t>(source.attr("number"));
     head.name = name_.c_str();
     head.robot_digest = robot_digest;

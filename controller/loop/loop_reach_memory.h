@@ -10,6 +10,19 @@
 
 namespace engram {
 
+// Appends the guesses of an answer, which must outlive them, to the n candidates; returns their new number.
+template <class P, class Task> int reach_candidates(const MemoryAnswer<Task>& answer, Candidate<P>* candidates, int n) {
+  for (int i = 0; i < answer.n; ++i) {
+    const Guess<Task>& g = answer.guess[i];
+    const engram_candidate kind = g.kind == GuessKind::kNeighbour    ? ENGRAM_CANDIDATE_KNN
+                                  : g.kind == GuessKind::kRegression ? ENGRAM_CANDIDATE_GPR
+                                  : g.kind == GuessKind::kMixture    ? ENGRAM_CANDIDATE_GMR
+                                                                     : ENGRAM_CANDIDATE_LINE;
+    candidates[n++] = {kind, g.x, g.u, g.kind == GuessKind::kLine ? 0.0 : g.trust, 0.0, 0.0};
+  }
+  return n;
+}
+
 template <class Task, const MemoryTables& tables> struct ReachMemory {
   static constexpr int kGuesses = kMemoryGuesses;
 
@@ -26,6 +39,7 @@ template <class Task, const MemoryTables& tables> struct ReachMemory {
          {&tables.knn->head, &tables.gpr->head, &tables.bow->head, &tables.time->head, &tables.trust->head}) {
       digest = (digest ^ head->digest) * 0x100000001b3;  // as FNV-1a
     }
+    if (tables.mixture != nullptr) digest = (digest ^ tables.mixture->head.digest) * 0x100000001b3;
     return digest;
   }
 
@@ -36,18 +50,11 @@ template <class Task, const MemoryTables& tables> struct ReachMemory {
     MemoryOpts opts;
     opts.elsewhere = elsewhere;
     if (!remember) {
-      opts.neighbours = 0;
+      opts.neighbours = opts.mixtures = 0;
       opts.regression = false;
     }
     memory_query<Task>(tables, opts, target, x0, N, t, work, answer);
-    for (int i = 0; i < answer.n; ++i) {
-      const Guess<Task>& g = answer.guess[i];
-      const engram_candidate kind = g.kind == GuessKind::kNeighbour    ? ENGRAM_CANDIDATE_KNN
-                                    : g.kind == GuessKind::kRegression ? ENGRAM_CANDIDATE_GPR
-                                                                       : ENGRAM_CANDIDATE_LINE;
-      candidates[n++] = {kind, g.x, g.u, g.kind == GuessKind::kLine ? 0.0 : g.trust, 0.0, 0.0};
-    }
-    return n;
+    return reach_candidates(answer, candidates, n);
   }
 };
 

@@ -4,6 +4,8 @@
 // its own ends. Bent to another start and another end, the bow stays (memory_warp.h). Kinds of guesses:
 //
 //   neighbour   end and bow of one of the motions nearest in task space; inverse kinematics corrects the end for the goal
+//   mixture     end and leading coefficients of the bow of one of the modes that a mixture over tasks and motions holds likely here;
+//               inverse kinematics corrects the end: many modes in few bytes
 //   line        no bow: a straight line to an inverse kinematics solution
 //   regression  the same end as a line, and the bow that a Gaussian process predicts between start and end. (Between given ends
 //               the bow is nearly unique; as a function of the task alone it has many modes, which regression would average.)
@@ -18,6 +20,7 @@
 #define CONTROLLER_MEMORY_MEMORY_H_
 
 #include "controller/ocp/ocp_reach.h"
+#include "controller/tab/tab_gmr.h"
 #include "controller/tab/tab_gpr.h"
 #include "controller/tab/tab_knn.h"
 #include "controller/tab/tab_logit.h"
@@ -35,29 +38,32 @@ struct MemoryTables {
   const TabPca* bow;      // coefficients of the bow (m) -> weights over time (k, nq + nu) of bow and controls
   const TabRbf* time;     // the Gaussians over time, nq + nu channels; its domain [0, T] is the length of a remembered motion
   const TabLogit* trust;  // memory_trust_inputs -> probability that the solver succeeds
+  const TabGmr* mixture = nullptr;  // memory_features -> end posture (nq), leading coefficients of the bow; may be missing
 };
 
-enum class GuessKind : int32_t { kNeighbour, kRegression, kLine };
+enum class GuessKind : int32_t { kNeighbour, kRegression, kLine, kMixture };
 
 inline constexpr int kMemoryPool = 24;       // samples looked up; those whose end cannot be corrected make room for the next
 inline constexpr int kMemoryNeighbours = 8;  // most neighbours of an answer
+inline constexpr int kMemoryMixtures = 4;    // most modes of the mixture
 inline constexpr int kMemoryLines = 3;       // to the end of the best neighbour, to one found from home, to one found from here (or elsewhere)
-inline constexpr int kMemoryGuesses = kMemoryNeighbours + 2 * kMemoryLines;
+inline constexpr int kMemoryGuesses = kMemoryNeighbours + kMemoryMixtures + 2 * kMemoryLines;
 
 struct MemoryOpts {
   int neighbours = kMemoryNeighbours;  // 0 .. kMemoryNeighbours
+  int mixtures = kMemoryMixtures;      // 0 .. kMemoryMixtures
   int lines = kMemoryLines;            // 0 .. kMemoryLines; the first needs neighbours
   bool regression = true;              // a regression beside every line
   bool recall_controls = false;        // closer to the solver's controls, but no longer a motion: it opens gaps (docs/memory.md)
   int64_t elsewhere = 0;               // not 0: the last line's end is found from the posture of this random draw, not from here
-  double max_warp = 1.2;               // [rad] a neighbour whose end must turn a joint further is refused
+  double max_warp = 1.2;               // [rad] a neighbour or mode whose end must turn a joint further is refused
 };
 
 template <class Task> struct Guess {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots;
   GuessKind kind;
-  int32_t source;  // neighbour: index of its sample; line, regression: 0 best neighbour's end, 1 found from home, 2 from here
+  int32_t source;  // neighbour: index of its sample; mixture: of its component; line, regression: 0 best neighbour's end, 1 found from home, 2 from here
   double trust;    // [0, 1] estimated probability that the solver succeeds from here
   double warp;     // [rad] largest joint difference between its end and where inverse kinematics started
   double x[N + 1][R::nq + R::nv];  // states at the knots; x[0] is the measured state
@@ -67,7 +73,7 @@ template <class Task> struct Guess {
 // What a query found. Every query writes all but the guesses beyond n.
 template <class Task> struct MemoryAnswer {
   int32_t n;          // guesses
-  int32_t refused;    // samples looked up whose end could not be corrected for the goal
+  int32_t refused;    // samples and modes looked up whose end could not be corrected for the goal
   TabStatus status;   // kTabOutside: the task lies outside the tables' domain; kTabNotFinite: no guesses
   double distance;    // to the nearest sample, scaled [-]; infinite if the memory was not asked
   double deviation;   // of the surest regression, relative to its prior: 0 (known) .. 1 (unknown); 1 if it was not asked
@@ -86,7 +92,7 @@ template <class Task> struct MemoryWork;
 //   n      knots with a control, 1 <= n <= Task::nknots
 //   t      (n + 1) knot times from now [s], t[0] = 0, increasing
 //
-// Guesses come in the order neighbours (nearest first), lines, regressions. An x0, goal or t that is not finite (or
+// Guesses come in the order neighbours (nearest first), mixtures (likeliest first), lines, regressions. An x0, goal or t that is not finite (or
 // beyond 1e6) gives none. Defined in memory_query.h.
 template <class Task>
 void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, int n,

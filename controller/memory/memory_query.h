@@ -14,7 +14,7 @@ namespace engram {
 template <class Task> struct MemoryWork {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots, nq = R::nq;
-  static constexpr int kSlots = kMemoryNeighbours + (kLanes > 2 * kMemoryLines ? kLanes : 2 * kMemoryLines);
+  static constexpr int kSlots = kMemoryNeighbours + kMemoryMixtures + (kLanes > 2 * kMemoryLines ? kLanes : 2 * kMemoryLines);
   // A guess in the making.
   struct Slot {
     GuessKind kind;
@@ -31,6 +31,8 @@ template <class Task> struct MemoryWork {
   double features[kMemoryFeatures<Task>], bow_features[kMemoryBowFeatures<Task>];
   int32_t index[kMemoryPool];
   float distance2[kMemoryPool];
+  alignas(64) float mode[kMemoryMixtures * (nq + kMemoryMaxBow + TAB_LANES)];  // of the mixture
+  float mode_bow[kMemoryMixtures][kMemoryMaxBow];                              // with zeros for the coefficients it lacks
   alignas(64) float regression[kMemoryLines][kMemoryMaxBow + TAB_LANES];
   alignas(64) float weights[TAB_RBF_MAX_K * (nq + R::nu) + TAB_LANES];  // of a bow and its controls over time
   double basis[(N + 1) * TAB_RBF_MAX_K];
@@ -90,13 +92,22 @@ template <class Task> double warp_of(const typename MemoryWork<Task>::Slot& slot
   return warp;
 }
 
+// Of the slots [kept, last): those whose end could be corrected move to the front, up to `most` in all; returns how many there are.
+template <class Task>
+int keep_corrected(const MemoryOpts& opts, int kept, int last, int most, MemoryWork<Task>& w, MemoryAnswer<Task>& answer) {
+  for (int i = kept; i < last && kept < most; ++i) {
+    if (w.slot[i].reached && warp_of<Task>(w.slot[i]) <= opts.max_warp) w.slot[kept++] = w.slot[i];
+    else ++answer.refused;
+  }
+  return kept;
+}
+
 // The nearest samples whose end can be corrected -> the first slots; returns how many.
 template <class Task>
-int find_neighbours(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, MemoryWork<Task>& w,
+int find_neighbours(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, MemoryWork<Task>& w,
                     MemoryAnswer<Task>& answer) {
   constexpr int nq = Task::Robot::nq;
   if (opts.neighbours == 0) return 0;
-  memory_features<Task>(x0, goal, w.features);
   answer.status = tab_knn_query(tables.knn, w.features, kMemoryPool, w.index, w.distance2);
   answer.distance = std::sqrt(w.distance2[0]);
   int kept = 0;
@@ -109,12 +120,31 @@ int find_neighbours(const MemoryTables& tables, const MemoryOpts& opts, const Re
       for (int j = 0; j < nq; ++j) slot.start[j] = value[j];
     }
     find_ends(goal, kMemoryWarpIterations, kept, last, w);
-    for (int i = kept; i < last && kept < opts.neighbours; ++i) {
-      if (w.slot[i].reached && warp_of<Task>(w.slot[i]) <= opts.max_warp) w.slot[kept++] = w.slot[i];
-      else ++answer.refused;
-    }
+    kept = keep_corrected(opts, kept, last, opts.neighbours, w, answer);
   }
   return kept;
+}
+
+// The likeliest modes of the mixture whose end can be corrected -> further slots; returns how many slots there are.
+template <class Task>
+int find_mixtures(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, int slots, MemoryWork<Task>& w,
+                  MemoryAnswer<Task>& answer) {
+  constexpr int nq = Task::Robot::nq;
+  if (tables.mixture == nullptr || opts.mixtures == 0) return slots;
+  int32_t component[kMemoryMixtures];
+  float probability[kMemoryMixtures];
+  const TabStatus status = tab_gmr_modes(tables.mixture, w.features, opts.mixtures, component, probability, w.mode, nullptr);
+  answer.status = tab_worse(answer.status, status);
+  const int leading = tables.mixture->m - nq;
+  int last = slots;
+  for (int i = 0; i < opts.mixtures && component[i] >= 0; ++i) {
+    const float* const y = w.mode + i * tab_pad(tables.mixture->m);
+    for (int j = 0; j < tables.bow->m; ++j) w.mode_bow[i][j] = j < leading ? y[nq + j] : 0.0f;
+    auto& slot = add(w, last, GuessKind::kMixture, component[i], w.mode_bow[i], answer.distance);
+    for (int j = 0; j < nq; ++j) slot.start[j] = y[j];
+  }
+  find_ends(goal, kMemoryWarpIterations, slots, last, w);
+  return keep_corrected(opts, slots, last, last, w, answer);
 }
 
 // Lines and their regressions -> further slots; returns how many slots there are.
@@ -203,8 +233,10 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
     answer.status = kTabNotFinite;
     return;
   }
-  const int neighbours = memory::find_neighbours(tables, opts, goal, x0, w, answer);
-  answer.n = memory::find_lines(tables, opts, goal, x0, neighbours, w, answer);
+  memory_features<Task>(x0, goal, w.features);
+  const int neighbours = memory::find_neighbours(tables, opts, goal, w, answer);
+  const int remembered = memory::find_mixtures(tables, opts, goal, neighbours, w, answer);
+  answer.n = memory::find_lines(tables, opts, goal, x0, remembered, w, answer);
   for (int i = 0; i < answer.n; ++i) memory::judge<Task>(tables, w.slot[i], answer.guess[i]);
   tab_rbf_basis(tables.time, n + 1, t, w.basis, nullptr);
   const double T = tab_hi(&tables.time->head)[0];

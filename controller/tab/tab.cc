@@ -133,8 +133,8 @@ TabStatus tab_check(const TabHead* head, TabKind kind, uint64_t robot_digest, ui
     return kTabBad;
   }
   out << tab_kind_text(kind) << " table '" << (head->name ? head->name : "?") << "' ";
-  if (head->schema != TAB_SCHEMA) {
-    out << "has schema " << uint64_t{head->schema} << ", this controller reads " << uint64_t{TAB_SCHEMA};
+  if (head->schema != tab_schema(head->kind) && tab_schema(head->kind) != 0) {
+    out << "has schema " << uint64_t{head->schema} << ", this controller reads " << uint64_t{tab_schema(head->kind)};
   } else if (head->kind != static_cast<uint32_t>(kind)) {
     out << "is of another kind: " << tab_kind_text(head->kind);
   } else if (robot_digest && head->robot_digest != robot_digest) {
@@ -163,6 +163,21 @@ TabStatus tab_domain(const TabHead* head, const double* x) {
     if (x[i] < lo[i] || x[i] > hi[i]) status = kTabOutside;
   }
   return status;
+}
+
+uint32_t tab_schema(uint32_t kind) {
+  switch (kind) {
+    case kTabKnn: return TAB_KNN_SCHEMA;
+    case kTabGpr: return TAB_GPR_SCHEMA;
+    case kTabPca: return TAB_PCA_SCHEMA;
+    case kTabRbf: return TAB_RBF_SCHEMA;
+    case kTabLogit: return TAB_LOGIT_SCHEMA;
+    case kTabGmr: return TAB_GMR_SCHEMA;
+    case kTabMlp: return TAB_MLP_SCHEMA;
+    case kTabSdf: return TAB_SDF_SCHEMA;
+    case kTabTt: return TAB_TT_SCHEMA;
+  }
+  return 0;
 }
 
 const char* tab_kind_text(uint32_t kind) {

@@ -16,7 +16,6 @@ extern "C" {
 #endif
 
 enum {
-  TAB_SCHEMA = 1,    /* layout of the structs below; a table of another schema is refused */
   TAB_LANES = 8,     /* floats in a vector: rows and blocks are padded to it */
   TAB_ARRAYS = 12,   /* most arrays in one table */
   TAB_MAX_IN = 64,   /* most inputs of a table: bounds the evaluators' scratch */
@@ -50,7 +49,7 @@ typedef struct TabArray {
 } TabArray;
 
 typedef struct TabHead {
-  uint32_t schema;        /* TAB_SCHEMA */
+  uint32_t schema;        /* tab_schema(kind) of the generator */
   uint32_t kind;          /* TabKind */
   const char* name;       /* C symbol of the table */
   uint64_t digest;        /* tab_digest of the arrays */
@@ -93,6 +92,9 @@ static inline int64_t tab_words(int32_t type, int64_t count) {
   const int64_t size = type == kTabFloat32 ? 4 : type == kTabFloat16 ? 2 : 1;
   return (count * size + 3) / 4;
 }
+
+/* The schema of a kind that these evaluators read: TAB_KNN_SCHEMA, ...; 0 for a kind that they do not know. */
+uint32_t tab_schema(uint32_t kind);
 
 const char* tab_kind_text(uint32_t kind); /* TabKind */
 const char* tab_status_text(TabStatus status);

@@ -16,6 +16,7 @@
 extern "C" {
 #endif
 
+enum { TAB_GMR_SCHEMA = 1 }; /* layout of TabGmr; a table of another schema is refused */
 enum {
   TAB_GMR_MAX_K = 64,   /* most components */
   TAB_GMR_MAX_M = 256,  /* most outputs: with the above, bounds the scratch of a query (3 kB on the stack) */

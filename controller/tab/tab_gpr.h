@@ -12,6 +12,7 @@
 extern "C" {
 #endif
 
+enum { TAB_GPR_SCHEMA = 1 }; /* layout of TabGpr; a table of another schema is refused */
 enum { TAB_GPR_MAX_N = 1024 }; /* most samples: bounds the scratch of a query (4 kB on the stack) */
 
 typedef struct TabGpr {

@@ -8,6 +8,8 @@
 extern "C" {
 #endif
 
+enum { TAB_KNN_SCHEMA = 1 }; /* layout of TabKnn; a table of another schema is refused */
+
 typedef struct TabKnn {
   TabHead head;        /* arrays: lo hi scale x value */
   int32_t n, d, m;     /* samples, inputs, numbers remembered with a sample */

@@ -8,6 +8,8 @@
 extern "C" {
 #endif
 
+enum { TAB_LOGIT_SCHEMA = 1 }; /* layout of TabLogit; a table of another schema is refused */
+
 typedef struct TabLogit {
   TabHead head;         /* arrays: lo hi weight */
   int32_t d;            /* inputs */

@@ -14,6 +14,7 @@
 extern "C" {
 #endif
 
+enum { TAB_MLP_SCHEMA = 1 }; /* layout of TabMlp; a table of another schema is refused */
 enum {
   TAB_MLP_MAX_WIDTH = 512, /* widest layer: bounds the scratch of a query (7 kB on the stack) */
   TAB_MLP_MAX_DEPTH = 8,   /* most hidden layers */

@@ -8,6 +8,8 @@
 extern "C" {
 #endif
 
+enum { TAB_PCA_SCHEMA = 1 }; /* layout of TabPca; a table of another schema is refused */
+
 typedef struct TabPca {
   TabHead head;        /* arrays: lo hi mean basis */
   int32_t m, n;        /* components, decoded numbers */

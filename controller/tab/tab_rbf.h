@@ -12,6 +12,7 @@
 extern "C" {
 #endif
 
+enum { TAB_RBF_SCHEMA = 1 }; /* layout of TabRbf; a table of another schema is refused */
 enum { TAB_RBF_MAX_K = 64 }; /* most Gaussians */
 
 typedef struct TabRbf {

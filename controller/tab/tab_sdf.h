@@ -12,6 +12,7 @@
 extern "C" {
 #endif
 
+enum { TAB_SDF_SCHEMA = 1 }; /* layout of TabSdf; a table of another schema is refused */
 enum {
   TAB_SDF_BOX = 15,   /* numbers of a box: centre (3), rotation R_WB row by row (9), half extents (3) */
   TAB_SDF_SPHERE = 4, /* of a sphere: centre (3), radius */

@@ -11,6 +11,7 @@
 extern "C" {
 #endif
 
+enum { TAB_TT_SCHEMA = 1 }; /* layout of TabTt; a table of another schema is refused */
 enum {
   TAB_TT_MAX_D = 128, /* variables */
   TAB_TT_MAX_N = 512, /* points of a variable */

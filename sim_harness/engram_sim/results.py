@@ -70,6 +70,13 @@ class Run:
         """Jumps that came to their end."""
         return [jump for jump in self.jumps if jump["t_end_s"] > 0.0]
 
+    def won(self) -> dict[str, float]:
+        """Shares of the jumps at which a guess of each kind seeded the solver; of a controller that writes jumps.csv."""
+        path = self.folder / "jumps.csv"
+        lines = path.read_text(encoding="utf-8").splitlines()[1:] if path.is_file() else []
+        kinds = [line.split(",")[2] for line in lines if line.count(",") > 2 and not line.startswith("0,")]
+        return {kind: kinds.count(kind) / len(kinds) for kind in sorted(set(kinds))}
+
     def summary(self) -> dict[str, Any]:
         """The mode's row of the table: shares, times (s, us), errors."""
         jumps = self.finished()
@@ -86,6 +93,8 @@ class Run:
         for k, values in self.suboptimality.items():
             if len(values):
                 row[f"subopt{k}"] = float(np.median(values))
+        if won := self.won():
+            row["won"] = won
         total = self.timing.get("total_us", np.array([]))
         if len(total):
             row["cycle_us"] = percentiles(total)
@@ -144,6 +153,8 @@ def figures(robot: str, runs: list[Run], seed: int = SEED) -> list[dict[str, Any
         add(f"subopt1.{mode}", row.get("subopt1"), "1", row["jumps"])
         add(f"subopt3.{mode}", row.get("subopt3"), "1", row["jumps"])
     row = rows.get("memory", {})
+    for kind, share in row.get("won", {}).items():
+        add(f"won.{kind}", share, "1", row["jumps"])
     cycles = next((len(run.timing.get("total_us", [])) for run in runs if run.mode == "memory"), 0)
     for kind in ("p50", "p99", "max"):
         add(f"cycle_us.{kind}", row.get("cycle_us", {}).get(kind), "us", cycles)

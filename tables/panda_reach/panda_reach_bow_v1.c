@@ -80,7 +80,7 @@ extern const float panda_reach_bow_v1_basis[17784] __attribute__((visibility("hi
 
 const TabPca panda_reach_bow_v1 = {
   .head = {
-    .schema = TAB_SCHEMA,
+    .schema = 1,
     .kind = kTabPca,
     .name = "panda_reach_bow_v1",
     .digest = 0xbe6a14f575e7d0b9u,

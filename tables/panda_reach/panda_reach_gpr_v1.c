@@ -52,7 +52,7 @@ extern const float panda_reach_gpr_v1_linv[127008] __attribute__((visibility("hi
 
 const TabGpr panda_reach_gpr_v1 = {
   .head = {
-    .schema = TAB_SCHEMA,
+    .schema = 1,
     .kind = kTabGpr,
     .name = "panda_reach_gpr_v1",
     .digest = 0xaf79ca8bf7e97398u,

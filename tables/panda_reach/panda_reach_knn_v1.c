@@ -34,7 +34,7 @@ extern const float panda_reach_knn_v1_value[181376] __attribute__((visibility("h
 
 const TabKnn panda_reach_knn_v1 = {
   .head = {
-    .schema = TAB_SCHEMA,
+    .schema = 1,
     .kind = kTabKnn,
     .name = "panda_reach_knn_v1",
     .digest = 0xb1f8a2b0ac21d2c6u,

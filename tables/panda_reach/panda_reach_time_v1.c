@@ -25,7 +25,7 @@ _Alignas(64) static const float panda_reach_time_v1_center[24] = {
 
 const TabRbf panda_reach_time_v1 = {
   .head = {
-    .schema = TAB_SCHEMA,
+    .schema = 1,
     .kind = kTabRbf,
     .name = "panda_reach_time_v1",
     .digest = 0xa9f5b64cb40f32dau,

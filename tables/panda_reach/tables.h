@@ -2,6 +2,7 @@
 #ifndef TABLES_PANDA_REACH_TABLES_H_
 #define TABLES_PANDA_REACH_TABLES_H_
 
+#include "controller/tab/tab_gmr.h"
 #include "controller/tab/tab_gpr.h"
 #include "controller/tab/tab_knn.h"
 #include "controller/tab/tab_logit.h"
@@ -15,7 +16,8 @@ extern const TabKnn panda_reach_knn_v1;  /* [rad] median largest joint differenc
 extern const TabGpr panda_reach_gpr_v1;  /* [rad] rms of a motion between its true ends, its bow predicted, on 314 held-out motions */
 extern const TabPca panda_reach_bow_v1;  /* [rad] rms of a decoded motion on 314 held-out motions */
 extern const TabRbf panda_reach_time_v1;  /* [rad] rms of a motion's Gaussians before PCA on 314 held-out motions */
-extern const TabLogit panda_reach_trust_v1;  /* [1] Brier score of the success of 624 guesses on held-out tasks */
+extern const TabLogit panda_reach_trust_v1;  /* [1] Brier score of the success of 773 guesses on held-out tasks */
+extern const TabGmr panda_reach_gmr_v1;  /* [rad] median largest joint difference of the nearest of 4 modes' ends on 314 held-out motions */
 #ifdef __cplusplus
 }
 #endif

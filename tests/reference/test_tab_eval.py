@@ -233,7 +233,7 @@ def test_more_neighbours_than_samples(tables: Tables) -> None:
 
 def test_compiled_tables_pass_the_check(tables: Tables) -> None:
     text = ctypes.create_string_buffer(256)
-    for constant, number in KINDS.items():
+    for constant, (number, _) in KINDS.items():
         kind = constant.removeprefix("kTab").lower()
         table = ctypes.byref(tables.table(kind))
         assert tables.lib.tab_check(table, number, ctypes.c_uint64(0xABC), ctypes.c_uint64(0xDEF), text) == OK, text.value

@@ -9,7 +9,7 @@ from scipy.stats import multivariate_normal, multivariate_t
 from engram.emit import Gmr, Gpr, Knn, Logit, Mlp, Sdf, Table
 from engram.emit.arrays import Array
 from engram.engine import engine
-from engram.learn.mixture import Conditional, Mixture, condition, fit_bayesian, fit_gaussian
+from engram.learn.mixture import Conditional, Mixture, condition, fit_bayesian, fit_gaussian, mixture_table
 from engram.learn.network import Network, density_gradient, fit_density, fit_ensemble, split_head
 
 QUERIES = 10_000
@@ -37,8 +37,7 @@ def data() -> tuple[np.ndarray, np.ndarray]:
 
 
 def gmr(fitted: Conditional, x: np.ndarray, type: str = "float32") -> Gmr:
-    return Gmr(log_norm=fitted.log_norm, freedom=fitted.freedom, mean_x=fitted.mean_x, linv=fitted.linv, mean_y=fitted.mean_y,
-               slope=fitted.slope, var=fitted.var, type=type, **domain(x))  # fmt: skip
+    return mixture_table(fitted, type=type, **domain(x))
 
 
 def mlp(net: Network, x: np.ndarray, type: str = "float32") -> Mlp:
@@ -355,7 +354,8 @@ class Cut:
 
     def __init__(self, table: Table, array: int):
         self.table, self.array = table, array
-        self.role, self.number, self.inputs, self.outputs = table.role, table.number, table.inputs, table.outputs
+        self.role, self.number, self.schema = table.role, table.number, table.schema
+        self.inputs, self.outputs = table.inputs, table.outputs
 
     def fields(self) -> dict:
         return self.table.fields()
@@ -365,6 +365,13 @@ class Cut:
         whole = arrays[self.array]
         arrays[self.array] = Array(whole.name, "", whole.flat[: -4 // whole.flat.itemsize].copy())
         return arrays
+
+
+def test_a_table_of_another_schema_is_refused(data, ensemble: Network) -> None:
+    table = Cut(mlp(ensemble, data[0]), -1)
+    table.schema += 1
+    with pytest.raises(ValueError, match="has schema 0x0*2, this controller reads 0x0*1; run 'make tables' and build again"):
+        engine.Table(table)
 
 
 def test_a_table_whose_sizes_contradict_is_refused(data, ensemble: Network, world) -> None:

@@ -22,7 +22,7 @@ using R = Task::Robot;
 using P = Reach<Task>;
 constexpr int N = Task::nknots, nq = R::nq, nv = R::nv;
 constexpr MemoryTables kTables{&panda_reach_knn_v1, &panda_reach_gpr_v1, &panda_reach_bow_v1, &panda_reach_time_v1,
-                               &panda_reach_trust_v1};
+                               &panda_reach_trust_v1, &panda_reach_gmr_v1};
 
 struct Query {
   std::mt19937 random;
@@ -90,7 +90,7 @@ TEST(MemoryCheck, AMissingForeignOrMisfittingTableIsNamed) {
 }
 
 TEST(MemoryQuery, EveryGuessIsAMotionFromTheStateToTheGoal) {
-  int neighbours = 0, regressions = 0, lines = 0;
+  int of_kind[4] = {};
   for (unsigned seed = 0; seed < 30; ++seed) {
     Query query(seed);
     for (int i = 0; i < nv; ++i) query.x0[nq + i] = query.uniform(-0.5, 0.5);
@@ -98,11 +98,11 @@ TEST(MemoryQuery, EveryGuessIsAMotionFromTheStateToTheGoal) {
     ASSERT_LE(answer.n, kMemoryGuesses);
     for (int g = 0; g < answer.n; ++g) {
       const Guess<Task>& guess = answer.guess[g];
-      (guess.kind == GuessKind::kNeighbour ? neighbours : guess.kind == GuessKind::kLine ? lines : regressions)++;
+      ++of_kind[int(guess.kind)];
       EXPECT_EQ(std::memcmp(guess.x[0], query.x0, sizeof query.x0), 0);
       EXPECT_GE(guess.trust, 0);
       EXPECT_LE(guess.trust, 1);
-      if (guess.kind == GuessKind::kNeighbour) {
+      if (guess.kind == GuessKind::kNeighbour || guess.kind == GuessKind::kMixture) {
         EXPECT_LE(guess.warp, query.opts.max_warp);
       }
       // trust 0 marks the only guesses that may miss
@@ -119,9 +119,10 @@ TEST(MemoryQuery, EveryGuessIsAMotionFromTheStateToTheGoal) {
       }
     }
   }
-  EXPECT_GT(neighbours, 60);  // two per query, far from the data as these random states are
-  EXPECT_GT(regressions, 60);
-  EXPECT_EQ(lines, 30 * kMemoryLines);
+  EXPECT_GT(of_kind[int(GuessKind::kNeighbour)], 60);  // two per query, far from the data as these random states are
+  EXPECT_GT(of_kind[int(GuessKind::kMixture)], 30);
+  EXPECT_GT(of_kind[int(GuessKind::kRegression)], 60);
+  EXPECT_EQ(of_kind[int(GuessKind::kLine)], 30 * kMemoryLines);
 }
 
 TEST(MemoryQuery, OrderAndOptions) {
@@ -136,13 +137,14 @@ TEST(MemoryQuery, OrderAndOptions) {
   EXPECT_GT(all.deviation, 0);
   EXPECT_LT(all.deviation, 1);
   for (int g = 1; g < all.n; ++g) {
-    const auto rank = [](GuessKind kind) { return kind == GuessKind::kNeighbour ? 0 : kind == GuessKind::kLine ? 1 : 2; };
+    constexpr int kRank[] = {0, 3, 2, 1};  // neighbours, mixtures, lines, regressions
+    const auto rank = [&](GuessKind kind) { return kRank[int(kind)]; };
     EXPECT_LE(rank(all.guess[g - 1].kind), rank(all.guess[g].kind));
   }
   query.opts.regression = false;
   query.ask();
   EXPECT_EQ(count(GuessKind::kRegression), 0);
-  query.opts.neighbours = 0;
+  query.opts.neighbours = query.opts.mixtures = 0;
   const MemoryAnswer<Task>& lines = query.ask();
   EXPECT_EQ(lines.n, kMemoryLines - 1);  // no best neighbour to go to
   EXPECT_EQ(count(GuessKind::kLine), lines.n);
@@ -154,6 +156,29 @@ TEST(MemoryQuery, OrderAndOptions) {
   query.opts.neighbours = 1;
   query.ask();
   EXPECT_LE(count(GuessKind::kNeighbour), 1);
+}
+
+TEST(MemoryQuery, WithoutAMixtureTheOtherGuessesAreTheSame) {
+  Query query(4);
+  query.ask();
+  MemoryTables tables = kTables;
+  tables.mixture = nullptr;
+  const auto work = std::make_unique<MemoryWork<Task>>();
+  const auto answer = std::make_unique<MemoryAnswer<Task>>();
+  memory_query<Task>(tables, query.opts, query.goal, query.x0, N, query.t, *work, *answer);
+  int same = 0, modes = 0;
+  for (int g = 0; g < query.answer->n; ++g) {
+    const Guess<Task>& guess = query.answer->guess[g];
+    if (guess.kind == GuessKind::kMixture) {
+      ++modes;
+      EXPECT_GE(guess.source, 0);
+      continue;
+    }
+    ASSERT_LT(same, answer->n);
+    EXPECT_EQ(std::memcmp(guess.x, answer->guess[same++].x, sizeof guess.x), 0);
+  }
+  EXPECT_EQ(same, answer->n);
+  EXPECT_GT(modes, 0);
 }
 
 TEST(MemoryQuery, ARememberedTaskIsRecalled) {

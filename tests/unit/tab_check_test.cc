@@ -27,7 +27,7 @@ struct Line {
 
   Line() {
     TabHead& h = table.head;
-    h.schema = TAB_SCHEMA;
+    h.schema = TAB_KNN_SCHEMA;
     h.kind = kTabKnn;
     h.name = "line";
     h.robot_digest = kRobot;

@@ -21,7 +21,7 @@ struct Small {
 
   Small() {
     TabHead& h = table.head;
-    h.schema = TAB_SCHEMA;
+    h.schema = TAB_TT_SCHEMA;
     h.kind = kTabTt;
     h.name = "small";
     h.nin = 2;

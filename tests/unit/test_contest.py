@@ -79,7 +79,7 @@ def test_the_verdict_judges_on_tasks_it_has_not_chosen_by() -> None:
         "b": outcomes([2] * 4, [False, True, False, True], [1.0] * 4),
     }
     verdict = judge([contender("a"), contender("b")], found, LOWEST, 0)
-    figures = {name: value for name, value, _ in verdict.figures}
-    assert verdict.ensemble == ("a",) and figures["a.success"] == 0.5
-    assert figures["ensemble.success"] == 0.0 and figures["ensemble.success_any"] == 0.0
+    figures = {name: value for name, value, *_ in verdict.figures}
+    assert verdict.ensemble == ("a",) and figures["success.a"] == 0.5
+    assert figures["success.ensemble"] == 0.0 and figures["success_any.ensemble"] == 0.0
     assert any(line.startswith("ensemble: a; chosen on 2 tasks, judged on 2 others") for line in verdict.lines)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,11 +12,13 @@ import pytest
 from engram.cli import main
 from engram.emit import Knn, Logit, read_folder, write_tables
 from engram.emit.arrays import Array, array, blocks, pad, restored, stored, triangle, unblocks
+from engram.emit.kinds import KINDS
 from engram.emit.read import faults
 from engram.emit.write import c_float
 from engram.inputs import InputError
 
 NAME = "toy_task"
+ROOT = Path(__file__).resolve().parents[2]
 
 
 def tables(n: int = 30, m: int = 5) -> list:
@@ -96,6 +99,17 @@ def test_stored_arrays_are_read_back(tmp_path: Path, rows: int) -> None:
     (found,) = read_folder(tmp_path)[1]
     for a, b in zip(found.arrays, table.arrays(), strict=True):
         assert (a.name, a.type) == (b.name, b.type) and np.array_equal(a.flat, b.flat)
+
+
+def test_kinds_and_schemas_are_those_of_the_evaluators() -> None:
+    tab = ROOT / "controller" / "tab"
+    kinds = dict(
+        re.findall(r"(kTab\w+) = (\d+)", re.search(r"typedef enum TabKind \{(.*?)\}", (tab / "tab.h").read_text(), re.S)[1])
+    )
+    assert {name: str(number) for name, (number, _) in KINDS.items()} == kinds
+    for name, (_, schema) in KINDS.items():
+        kind = name.removeprefix("kTab").lower()
+        assert f"enum {{ TAB_{kind.upper()}_SCHEMA = {schema} }};" in (tab / f"tab_{kind}.h").read_text()
 
 
 def test_same_tables_same_bytes(tmp_path: Path) -> None:

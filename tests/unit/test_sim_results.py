@@ -29,7 +29,7 @@ def test_wilson_interval_at_the_ends() -> None:
 def test_enumerators_follow_the_header() -> None:
     assert enumerators("engram_status")[:3] == ["converged", "iterating", "deadline"]
     assert enumerators("engram_rung") == ["plan", "shifted", "hold", "damping", "off"]
-    assert enumerators("engram_candidate") == ["shifted", "knn", "gpr", "line", "cold"]
+    assert enumerators("engram_candidate") == ["shifted", "knn", "gpr", "gmr", "line", "cold"]
     assert enumerators("engram_nonsense") == []
 
 
@@ -87,8 +87,10 @@ def test_summary_counts_and_times(tmp_path: Path) -> None:
     jumps = [jump(True), jump(True, arrival=2.0), jump(False, "late+contact", -1.0), jump(False, "limit", 0.7)]
     (tmp_path / "results.json").write_text(plant_results(jumps))
     (tmp_path / "timing.csv").write_text("utime,seq,query_us,total_us\n0,1,10,100\n1,2,0,100\n")
+    (tmp_path / "jumps.csv").write_text("jump,utime,winner,merits\n1,0,knn,3\n2,9,gmr,2,1\n3,9,knn,2\n4,9,knn,2\n0,0,cold,0\n5,")
     run = read_run("memory", tmp_path)
     row = run.summary()
+    assert row["won"] == {"gmr": 0.25, "knn": 0.75}
     assert (row["jumps"], row["successes"], row["late"], row["contact"], row["limit"]) == (4, 2, 1, 1, 1)
     assert row["success"] == 0.5 and row["arrival_median_s"] == 1.5 and row["query_share"] == 0.05
     records = {record["id"]: record for record in figures("panda", [run])}
@@ -97,6 +99,7 @@ def test_summary_counts_and_times(tmp_path: Path) -> None:
     assert other == [name.replace("demo.panda.", "demo.panda.seed7.") for name in records]
     assert records["demo.panda.success.memory"]["value"] == 0.5 and records["demo.panda.success.memory"]["n"] == 4
     assert records["demo.panda.cycle_us.max"]["value"] == 100.0
+    assert records["demo.panda.won.gmr"]["value"] == 0.25
     assert "demo.panda.subopt1.memory" not in records  # not measured: absent
 
 

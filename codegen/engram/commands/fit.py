@@ -20,6 +20,7 @@ beside controls: standing still, straight lines, random postures, nearest neighb
 LIMIT = 2_000_000  # bytes of all files of a memory
 HELD_OUT = 10  # every tenth motion is kept out of the tables, to measure their errors and to calibrate the trust
 TRIALS = 150  # of them, tasks on which guesses are tried
+GOAL_CHOICES = 60  # of goals, by the memory as a metric
 CONTEST = 100  # of them, tasks on which the learners compete
 
 
@@ -50,7 +51,7 @@ def run(args: argparse.Namespace) -> int:
     from engram.learn.dataset import load_motions
     from engram.learn.figures import write_figures
     from engram.learn.memory import Settings, fit_memory
-    from engram.learn.trials import decoding_loss, try_guesses
+    from engram.learn.trials import decoding_loss, metric_regret, try_guesses
     from engram.learn.trust import fit_trust
     from engram.tasks.spec import load_task
 
@@ -67,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     manifest = write_tables(
         args.out / name,
         name,
-        [memory.knn, memory.gpr, memory.bow, memory.time, trust],
+        [memory.knn, memory.gpr, memory.bow, memory.time, trust, memory.mixture],
         robot_digest=spec.robot.digest,
         task_digest=spec.digest,
         data_digest=source.digest,
@@ -75,9 +76,11 @@ def run(args: argparse.Namespace) -> int:
     )
     size = sum(file["bytes"] for file in manifest["files"].values())
     report = [*memory.report, *decoding_loss(spec, memory, source), *trust_report, ("bytes", float(size), "byte")]
-    for key, value, unit in report:
+    counted = [(*line, int(motions.held_out.sum())) for line in report]
+    counted += [(*line, GOAL_CHOICES) for line in metric_regret(spec, memory, source, GOAL_CHOICES)]
+    for key, value, unit, _ in counted:
         print(f"fit:    {key:<28} {value:.4g} {unit}")
-    write_figures("fit", [(f"fit.{name}.{key}", value, unit, int(motions.held_out.sum())) for key, value, unit in report])
+    write_figures("fit", [(f"fit.{name}.{key}", value, unit, n) for key, value, unit, n in counted])
     print(f"fit:    {relative(args.out / name)}: {len(manifest['files'])} files")
     if args.contest > 0:
         from engram.learn.contenders import Settings as LearnerSettings
@@ -87,7 +90,7 @@ def run(args: argparse.Namespace) -> int:
             spec, memory, source, args.contest, LIMIT, LearnerSettings(), lambda text: print(f"contest: {text}", flush=True)
         )
         print("\n".join(f"contest: {line}" for line in verdict.lines))
-        write_figures("contest", [(f"contest.{name}.{key}", value, unit, args.contest) for key, value, unit in verdict.figures])
+        write_figures("contest", [(f"contest.{key}", *figure) for key, *figure in verdict.figures])
     if size > LIMIT:
         raise InputError(f"the tables take {size} bytes, the limit is {LIMIT}: fit fewer motions or coefficients")
     return 0

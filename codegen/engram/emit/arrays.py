@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-SCHEMA = 1  # TAB_SCHEMA of controller/tab/tab.h
 LANES = 8  # TAB_LANES
 FAR = 1e15  # TAB_FAR
 

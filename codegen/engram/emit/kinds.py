@@ -9,10 +9,10 @@ import numpy as np
 
 from engram.emit.arrays import TYPES, Array, array, blocks, pad, padded_rows, triangle
 
-# TabKind of controller/tab/tab.h
+# TabKind of controller/tab/tab.h, and TAB_<KIND>_SCHEMA of the kind's header
 KINDS = {
-    "kTabKnn": 1, "kTabGpr": 2, "kTabPca": 3, "kTabRbf": 4, "kTabLogit": 5, "kTabGmr": 6, "kTabMlp": 7, "kTabSdf": 8,
-    "kTabTt": 10,
+    "kTabKnn": (1, 1), "kTabGpr": (2, 1), "kTabPca": (3, 1), "kTabRbf": (4, 1), "kTabLogit": (5, 1), "kTabGmr": (6, 1),
+    "kTabMlp": (7, 1), "kTabSdf": (8, 1), "kTabTt": (10, 1),
 }  # fmt: skip
 
 
@@ -32,7 +32,12 @@ class Table(ABC):
     @property
     def number(self) -> int:
         """Its TabKind as a number."""
-        return KINDS[self.constant]
+        return KINDS[self.constant][0]
+
+    @property
+    def schema(self) -> int:
+        """The layout of its struct."""
+        return KINDS[self.constant][1]
 
     @property
     @abstractmethod

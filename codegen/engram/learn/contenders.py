@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from engram.emit import Gmr, Knn, Mlp, Table
+from engram.emit import Knn, Mlp, Table
 from engram.engine import engine
 from engram.learn.memory import Memory, Motions, bow_features
-from engram.learn.mixture import Conditional, condition, fit_bayesian, fit_gaussian
+from engram.learn.mixture import condition, fit_gaussian, mixture_table
 from engram.learn.network import Network, fit_density, fit_ensemble
 
 ANSWERS = 8  # asked of every learner, as many as the memory has neighbours
@@ -26,8 +26,8 @@ RANDOM = 8  # postures of the uniform control
 class Settings:
     """Sizes of the learners."""
 
-    leading: int = 12  # coefficients of the bow that mixtures predict; the others are left at their mean
-    components: int = 24  # of the mixtures
+    leading: int = 12  # coefficients of the bow that learners predict; the others are left at their mean
+    components: int = 24  # of the mixture of Gaussians
     hidden: int = 64
     depth: int = 2
     members: int = 5  # of the ensemble
@@ -95,12 +95,6 @@ def common(table: Table) -> dict:
     return dict(inputs=table.inputs, lo=table.lo, hi=table.hi, held_out_error=0.0, held_out_text="not measured")
 
 
-def mixture_table(fitted: Conditional, **rest: object) -> Gmr:
-    """The table of a conditioned mixture."""
-    return Gmr(log_norm=fitted.log_norm, freedom=fitted.freedom, mean_x=fitted.mean_x, linv=fitted.linv, mean_y=fitted.mean_y,
-               slope=fitted.slope, var=fitted.var, **rest)  # fmt: skip
-
-
 def network_table(net: Network, **rest: object) -> Mlp:
     """The table of a network."""
     return Mlp(center=net.center, width=net.width, weights=net.weights, biases=net.biases, modes=net.modes, **rest)
@@ -117,13 +111,10 @@ def learners(
     shared = {**common(memory.knn), "role": "learner"}
     made = []
 
-    def mixture(fit: Callable) -> Gmr:
-        return mixture_table(condition(fit(x, y, settings.components, seed=settings.seed)), **shared)
-
     sizes = dict(hidden=settings.hidden, depth=settings.depth, epochs=settings.epochs, seed=settings.seed)
     for name, make in (
-        ("gmr", lambda: mixture(fit_gaussian)),
-        ("bgmr", lambda: mixture(fit_bayesian)),
+        ("gmr", lambda: mixture_table(condition(fit_gaussian(x, y, settings.components, seed=settings.seed)), **shared)),
+        ("bgmr", lambda: memory.mixture),
         ("mlp", lambda: network_table(fit_ensemble(x, y, members=settings.members, **sizes), **shared)),
         ("mdn", lambda: network_table(fit_density(x, y, modes=settings.modes, **sizes), **shared)),
     ):

@@ -154,10 +154,10 @@ def choose(
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a contest found: the lines to print, the figures (name, value, unit), and the ensemble that was chosen."""
+    """What a contest found: the lines to print, the figures (name, value, unit, n), and the ensemble that was chosen."""
 
     lines: list[str]
-    figures: list[tuple[str, float, str]]
+    figures: list[tuple[str, float, str, int]]
     ensemble: tuple[str, ...]
 
 
@@ -172,7 +172,7 @@ def judge(contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np
         lines.append(f"{name:<20}{100 * share:>8.1f}%{after[0]:>10.3g}{after[1]:>10.3g}{modes:>7.2f}{size:>10}{us:>10.1f}")
         values = {"success": share, "subopt1": after[0], "subopt3": after[1], "modes": modes, "bytes": size, "query": us}
         units = {"bytes": "byte", "query": "us"}
-        figures.extend((f"{name}.{key}", float(value), units.get(key, "1")) for key, value in values.items())
+        figures.extend((f"{key}.{name}", float(value), units.get(key, "1"), len(lowest)) for key, value in values.items())
 
     for contender in contenders:
         add(contender.name, outcomes[contender.name], lowest, contender.bytes, contender.query_us())
@@ -185,7 +185,7 @@ def judge(contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np
     any_good = np.any([outcomes[name].good for name in names], axis=0)[judging]
     lines.append(f"ensemble: {', '.join(names)}; chosen on {len(choosing)} tasks, judged on {len(judging)} others")
     lines.append(f"solved from each member's guess, the first that succeeds: {100 * any_good.mean():.1f} %")
-    figures.append(("ensemble.success_any", float(any_good.mean()), "1"))
+    figures.append(("success_any.ensemble", float(any_good.mean()), "1", len(judging)))
     return Verdict(lines, figures, names)
 
 

@@ -1,4 +1,4 @@
-"""The memory of one robot and task: from solved motions to the five tables of controller/memory/memory.h."""
+"""The memory of one robot and task: from solved motions to the tables of controller/memory/memory.h."""
 
 from __future__ import annotations
 
@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from engram.emit import Gpr, Knn, Pca, Rbf
+from engram.emit import Gmr, Gpr, Knn, Pca, Rbf
 from engram.learn.bow import BowCode, Dynamics, fit_bow_code, straight
 from engram.learn.gpr import FittedGpr, fit_gpr, fit_hyperparameters
+from engram.learn.mixture import condition, fit_bayesian, mixture_table
 from engram.learn.timebase import TimeBasis
+
+MODES = 4  # of the mixture that the controller asks for: kMemoryMixtures of controller/memory/memory.h
 
 
 @dataclass(frozen=True)
@@ -22,6 +25,8 @@ class Settings:
     components: int = 57  # coefficients of a bow
     weights: tuple[float, float, float, float] = (1.0, 4.0, 1.0, 0.5)  # k-NN: q, p_WT, target z axis, target x axis
     regression_samples: int = 500
+    mixture_components: int = 24
+    mixture_leading: int = 12  # coefficients of the bow that the mixture predicts
     hyperparameter_samples: int = 300
     hyperparameter_outputs: int = 10  # leading coefficients of the bow
     seed: int = 0
@@ -56,6 +61,7 @@ class Memory:
     gpr: Gpr
     bow: Pca
     time: Rbf
+    mixture: Gmr
     report: list[tuple[str, float, str]]
 
 
@@ -110,6 +116,17 @@ def fit_memory(
         held_out_text=f"[rad] median largest joint difference of the nearest sample's end on {n_test} held-out motions",
     )  # fmt: skip
 
+    progress(f"mixture: {settings.mixture_components} components")
+    answer = np.hstack([end, z[:, : settings.mixture_leading]])
+    fitted = condition(fit_bayesian(x[train], answer[train], settings.mixture_components, seed=settings.seed))
+    h, modes, _ = fitted.predict(x[test])
+    likely = np.take_along_axis(modes, np.argsort(-h, axis=1, kind="stable")[:, :MODES, None], axis=1)[:, :, :nq]
+    mixture_error = float(np.median(np.abs(likely - end[test][:, None]).max(axis=2).min(axis=1)))
+    mixture = mixture_table(
+        fitted, role="gmr", inputs=knn.inputs, lo=knn.lo, hi=knn.hi, held_out_error=mixture_error,
+        held_out_text=f"[rad] median largest joint difference of the nearest of {MODES} modes' ends on {n_test} held-out motions",
+    )  # fmt: skip
+
     progress(f"regression: hyperparameters on {settings.hyperparameter_samples}, exported {settings.regression_samples} samples")
     ends = bow_features(motions.q[:, 0], end, x[:, nq : nq + 3])
     chosen = np.random.default_rng(settings.seed).permutation(np.flatnonzero(train))[: settings.regression_samples]
@@ -143,11 +160,12 @@ def fit_memory(
         ("time.rms", time_error, "rad"),
         ("bow.rms", code_error, "rad"),
         ("knn.end", knn_error, "rad"),
+        ("gmr.end", mixture_error, "rad"),
         ("gpr.rms", gpr_error, "rad"),
         ("gpr.deviation", float(np.median(np.sqrt(variance / (gpr.variance + gpr.noise)))), "1"),
         ("gpr.noise", noise, "1"),
     ]
-    return Memory(code, gpr, knn, gpr_table, bow, time, report)
+    return Memory(code, gpr, knn, gpr_table, bow, time, mixture, report)
 
 
 def time_residual(time: TimeBasis, t: np.ndarray, q: np.ndarray) -> np.ndarray:

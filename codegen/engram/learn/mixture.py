@@ -11,6 +11,8 @@ from scipy.special import gammaln
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.mixture import BayesianGaussianMixture, GaussianMixture
 
+from engram.emit import Gmr
+
 
 @dataclass(frozen=True)
 class Mixture:
@@ -99,3 +101,9 @@ def condition(mixture: Mixture) -> Conditional:
     student = gammaln(0.5 * (safe + d)) - gammaln(0.5 * safe) - 0.5 * d * np.log(safe * np.pi)
     normalisation = np.where(nu > 0, student, -0.5 * d * np.log(2 * np.pi))
     return Conditional(np.log(mixture.weight) - log_det + normalisation, nu, mean_x, linv, mean_y, slope, var)
+
+
+def mixture_table(fitted: Conditional, **rest: object) -> Gmr:
+    """The table of a conditioned mixture."""
+    return Gmr(log_norm=fitted.log_norm, freedom=fitted.freedom, mean_x=fitted.mean_x, linv=fitted.linv, mean_y=fitted.mean_y,
+               slope=fitted.slope, var=fitted.var, **rest)  # fmt: skip

@@ -20,9 +20,7 @@ ITERATIONS = 30  # within which the solver must succeed for a guess to count as 
 def try_guesses(spec: TaskSpec, memory: Memory, source: Source, tasks: int) -> Trials:
     """Solve from every guess of `tasks` held-out tasks; good: it converges to a motion that arrives, clear of obstacles."""
     solver = ReachSolver(spec, 0, SolverSettings(iterations=ITERATIONS))
-    table = getattr(engine, f"{camel(f'{spec.robot.name}_{spec.name}')}Memory")(
-        memory.knn, memory.gpr, memory.bow, memory.time, constant_trust(0.5)
-    )
+    table = memory_of(spec, memory)
     number, inputs, good = [], [], []
     for i in np.flatnonzero(source.motions.held_out)[:tasks]:
         start, vector = source.motions.q[i, 0], source.vector[i]
@@ -34,6 +32,48 @@ def try_guesses(spec: TaskSpec, memory: Memory, source: Source, tasks: int) -> T
             inputs.append(row)
             good.append(solver.judge(found, vector) == OK)
     return Trials(np.array(number), np.array(inputs), np.array(good))
+
+
+GOALS = 4  # offered to the metric at a time
+
+
+def metric_regret(spec: TaskSpec, memory: Memory, source: Source, choices: int) -> list[tuple[str, float, str]]:
+    """The memory as a metric (thesis, algorithm 2): GOALS goals of held-out motions from one start, one of them chosen unsolved.
+
+    Cost of the solved way to the chosen goal above that to the cheapest one, median, beside that of a goal chosen blindly.
+    """
+    solver = ReachSolver(spec, 0, SolverSettings(iterations=ITERATIONS))
+    table = memory_of(spec, memory)
+    held_out = np.flatnonzero(source.motions.held_out)
+    chosen, blind, right = [], [], []
+    for i in range(min(choices, len(held_out) - GOALS)):
+        start, vectors = source.motions.q[held_out[i], 0], source.vector[held_out[i : i + GOALS]]
+        x0 = np.r_[start, np.zeros(len(start))]
+        best, _ = table.metric(x0, np.ascontiguousarray(vectors))
+        costs = []
+        for vector in vectors:
+            solver.set(start, vector)
+            answer = table.query(x0, vector)
+            guess = int(np.argmin(solver.problem.merit(answer["xs"], answer["us"])))
+            found = solver.problem.solve(
+                answer["xs"][guess], answer["us"][guess], iterations=ITERATIONS, stop=solver.settings.stop
+            )
+            costs.append(found["cost"])
+        above = np.array(costs) / min(costs) - 1
+        chosen.append(above[best])
+        blind.append(above.mean())
+        right.append(above[best] == 0)
+    return [
+        ("metric.right", float(np.mean(right)), "1"),
+        ("metric.excess", float(np.median(chosen)), "1"),
+        ("metric.excess_blind", float(np.median(blind)), "1"),
+    ]
+
+
+def memory_of(spec: TaskSpec, memory: Memory):
+    """The deployed query on fitted tables, whose trust knows nothing yet."""
+    kind = getattr(engine, f"{camel(f'{spec.robot.name}_{spec.name}')}Memory")
+    return kind(memory.knn, memory.gpr, memory.bow, memory.time, constant_trust(0.5), memory.mixture)
 
 
 def decoding_loss(spec: TaskSpec, memory: Memory, source: Source) -> list[tuple[str, float, str]]:

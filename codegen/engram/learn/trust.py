@@ -11,12 +11,13 @@ from sklearn.metrics import roc_auc_score
 from engram.emit import Logit
 from engram.learn.gpr import round_digits
 
-INPUTS = [("distance", "1"), ("deviation", "1"), ("warp", "rad"), ("regression", "1"), ("line", "1")]  # memory_features.h
+# of memory_features.h
+INPUTS = [("distance", "1"), ("deviation", "1"), ("warp", "rad"), ("regression", "1"), ("line", "1"), ("mixture", "1")]
 
 
 @dataclass(frozen=True)
 class Trials:
-    """Guesses that were tried. task (n,), inputs (n, 5) as memory_trust_inputs makes them, good (n,) bool."""
+    """Guesses that were tried. task (n,), inputs (n, 6) as memory_trust_inputs makes them, good (n,) bool."""
 
     task: np.ndarray
     inputs: np.ndarray
