@@ -71,7 +71,7 @@ template <class P, int N> void value_before_integrator(const typename FddpWork<P
       E.apply(vq);
     }
     base_rows<nvp>(m.E, &w.Vxx[0][0], nxp, &w.Vqq[0][0], nvp);  // E' Vqq E
-    for (int i = 6; i < nv; ++i) std::memcpy(w.Vqq[i], w.Vxx[i], nvp * sizeof(double));
+    for (int i = 6; i < nv; ++i) copy_row(w.Vqq[i], w.Vxx[i], nvp);
     for (int i = 0; i < nv; ++i) E.apply(w.Vqq[i]);
     double g[6], e[6];
     for (int i = 0; i < 6; ++i) {
@@ -121,7 +121,7 @@ template <class P, int N> void action_value(const typename FddpWork<P, N>::Model
     add_force_hessian<P, N>(m, w);
     add_coupled_hessian<nzp>(m, w.Q);
   } else {
-    for (int i = ov; i < nzp; ++i) std::memcpy(w.Q[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+    for (int i = ov; i < nzp; ++i) copy_row(w.Q[i], m.Lzz[i], padded(i + 1));
     kernel::product_lower<nzp, nv, Sign::kPlus, ov>(&m.D[0][0], nzp, &w.W[0][0], nzp, &w.Q[0][0], nzp);
   }
   std::memcpy(w.Qz, m.Lz, sizeof(w.Qz));
@@ -160,9 +160,9 @@ template <class P, int N> bool gains(int k, const FddpOpts& opts, FddpWork<P, N>
   }
   kernel::product_vector<nxp, nu, kernel::Sign::kMinus>(w.Q[ou], L::nzp, w.k[k], w.Qz);  // Vx = Qx - Qxu k
   kernel::solve_lower<nu, nxp>(&w.Luu[0][0], nup, inv, &w.Y[0][0], nxp);                // Y = L^-1 Qux
-  std::memcpy(s.K[k], w.Y, sizeof(w.Y));
+  copy_row(s.K[k][0], w.Y[0], nu * nxp);
   kernel::solve_lower_transposed<nu, nxp>(&w.Luu[0][0], nup, inv, &s.K[k][0][0], nxp);  // K = L^-T Y
-  for (int i = 0; i < nxp; ++i) std::memcpy(w.Vxx[i], w.Q[i], padded(i + 1) * sizeof(double));
+  for (int i = 0; i < nxp; ++i) copy_row(w.Vxx[i], w.Q[i], padded(i + 1));
   kernel::product_lower<nxp, nu, kernel::Sign::kMinus>(&w.Y[0][0], nxp, &w.Y[0][0], nxp, &w.Vxx[0][0], nxp);  // Qxx - Y' Y
   std::memcpy(w.Vx, w.Qz, sizeof(w.Vx));
   w.dg += gain1;

@@ -57,7 +57,7 @@ struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Robot>, double>, Coupl
 
 // The stored Hessian, as for a knot without contacts: block qq, and all blocks of the state.
 template <class C, int nt, int ld> inline void copy_hessian_qq(const ContactKnotModel<C, nt>& m, double (*to)[ld]) {
-  for (int i = 0; i < C::Robot::nv; ++i) std::memcpy(to[i], m.Hqq[i], padded(i + 1) * sizeof(double));
+  for (int i = 0; i < C::Robot::nv; ++i) copy_row(to[i], m.Hqq[i], padded(i + 1));
 }
 template <class C, int nt, int ld> inline void copy_hessian_x(const ContactKnotModel<C, nt>& m, double (*to)[ld]) {
   constexpr int nv = C::Robot::nv;

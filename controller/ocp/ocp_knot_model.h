@@ -51,12 +51,25 @@ template <class Layout, bool free_base, class S> struct KnotModel : BaseBlock<fr
   alignas(64) S Lzz[Layout::nzp][Layout::nzp];  // Gauss-Newton Hessian, lower triangle        (nz x nz)
 };
 
+// n doubles, a multiple of kVector, between vector boundaries. Rows are short: the processor's block copy, which the compiler makes of
+// memcpy and of a plain loop, takes longer to start than they take.
+inline void copy_row(double* to, const double* from, int n) {
+  typedef double Vector __attribute__((vector_size(kVector * sizeof(double)), aligned(kVector * sizeof(double)), may_alias));
+  for (int j = 0; j < n; j += kVector) {
+    Vector v = *reinterpret_cast<const Vector*>(from + j);
+#ifdef __x86_64__
+    asm("" : "+v"(v));
+#endif
+    *reinterpret_cast<Vector*>(to + j) = v;
+  }
+}
+
 // Block qq of a knot's Hessian, lower triangle up to the padding, into rows of ld; all blocks of the state likewise.
 template <class Layout, bool free_base, int ld> inline void copy_hessian_qq(const KnotModel<Layout, free_base, double>& m, double (*to)[ld]) {
-  for (int i = 0; i < Layout::nv; ++i) std::memcpy(to[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+  for (int i = 0; i < Layout::nv; ++i) copy_row(to[i], m.Lzz[i], padded(i + 1));
 }
 template <class Layout, bool free_base, int ld> inline void copy_hessian_x(const KnotModel<Layout, free_base, double>& m, double (*to)[ld]) {
-  for (int i = 0; i < Layout::nxp; ++i) std::memcpy(to[i], m.Lzz[i], padded(i + 1) * sizeof(double));
+  for (int i = 0; i < Layout::nxp; ++i) copy_row(to[i], m.Lzz[i], padded(i + 1));
 }
 // True for a model whose stored Hessian is block qq and a diagonal.
 template <class Model> inline constexpr bool kDiagonalHessian = false;
