@@ -188,8 +188,8 @@ def test_trust_is_calibrated() -> None:
 
 
 def test_trust_of_guesses_that_all_succeed() -> None:
-    table, report = fit_trust(Trials(np.arange(50), np.zeros((50, 5)), np.ones(50, bool)))
-    assert probability(table.weight, table.bias, np.zeros((1, 5)))[0] == pytest.approx(0.99) and report == [
+    table, report = fit_trust(Trials(np.arange(50), np.zeros((50, 6)), np.ones(50, bool)))
+    assert probability(table.weight, table.bias, np.zeros((1, 6)))[0] == pytest.approx(0.99) and report == [
         ("trust.good", 1.0, "1")
     ]
 
