@@ -109,7 +109,7 @@ void Scene::caption(const mjrRect& rect, const Panel& panel) {
   constexpr float kInk[3] = {0.13f, 0.16f, 0.20f};
   constexpr float kState[3][3] = {{0.35f, 0.38f, 0.42f}, {0.10f, 0.55f, 0.25f}, {0.78f, 0.16f, 0.14f}};
   label(10, rect.height - 40, 190, panel.title, kInk);
-  label(10, 10, 190, panel.note, kInk);
+  label(10, 10, std::max(190, 20 + 10 * static_cast<int>(panel.note.size())), panel.note, kInk);
   label(rect.width - 260, 10, 250, panel.outcome, kState[panel.state]);
 }
 

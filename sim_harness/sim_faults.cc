@@ -90,6 +90,7 @@ void Faults::push(Model* model, double t) {
   mju_zero(model->d->xfrc_applied, 6 * model->m->nbody);
   for (const Push& push : pushes_) {
     mju_addToScl3(model->d->xfrc_applied + 6 * push.body, push.force, push.share(t));
+    mju_addToScl3(model->d->xfrc_applied + 6 * push.body + 3, push.torque, push.share(t));
   }
   const auto over = [t](const Push& push) { return t >= push.t + push.duration; };
   pushes_.erase(std::remove_if(pushes_.begin(), pushes_.end(), over), pushes_.end());

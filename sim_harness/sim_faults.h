@@ -16,10 +16,11 @@ struct Push {
   double t = 0;         // s, plant clock
   int body = 0;         // MuJoCo body; the force acts at its centre of mass
   double force[3]{};    // N, world axes
+  double torque[3]{};   // N m, world axes
   double duration = 0;  // s
   bool smooth = false;  // a gust: grows and fades as (1 - cos) / 2
 
-  double share(double now) const;  // of the force, at a time
+  double share(double now) const;  // of force and torque, at a time
 };
 
 // Pushes out of nowhere, at times of a Poisson process.

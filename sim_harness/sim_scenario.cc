@@ -23,7 +23,8 @@ std::string take_push(bool smooth, const std::string& body, const std::vector<do
   push.body = mj_name2id(model.m, mjOBJ_BODY, body.c_str());
   if (push.body < 1) return "the scene has no body '" + body + "'";
   push.t = numbers[0], push.duration = numbers[1], push.smooth = smooth;
-  for (int i = 0; i < 3; ++i) push.force[i] = numbers[2 + i];
+  std::copy_n(numbers.begin() + 2, 3, push.force);
+  if (numbers.size() == 8) std::copy_n(numbers.begin() + 5, 3, push.torque);
   if (push.t < 0 || push.duration <= 0) return "a push needs a time from 0 on and a positive duration";
   trial->pushes.push_back(push);
   return "";
@@ -35,8 +36,8 @@ std::string take_line(const std::string& key, std::istringstream& line, const Mo
     std::string t, duration, body;
     line >> t >> duration >> body;
     std::istringstream times(t + " " + duration);
-    if (!read_numbers(times, &numbers) || !read_numbers(line, &numbers) || numbers.size() != 5)
-      return "the form is `" + key + " t d body fx fy fz`";
+    if (!read_numbers(times, &numbers) || !read_numbers(line, &numbers) || (numbers.size() != 5 && numbers.size() != 8))
+      return "the form is `" + key + " t d body fx fy fz [tx ty tz]`";
     return take_push(key == "gust", body, numbers, model, trial);
   }
   if (!read_numbers(line, &numbers)) return "not a finite number";

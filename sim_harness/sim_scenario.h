@@ -6,8 +6,8 @@
 //   episode <name> <s>                 an episode of this length; the lines below belong to it, times count from its beginning
 //   state q...                         the robot is put here, at rest (nq numbers, convention of state_t)
 //   task t value...                    from time t on this is the task
-//   push t d <body> fx fy fz           force (N, world axes) on a body's centre of mass from t on for d seconds
-//   gust t d <body> fx fy fz           the same, but it grows and fades: (1 - cos(2 pi s)) / 2 of the force at share s
+//   push t d <body> fx fy fz [tx ty tz]   force (N) on a body's centre of mass and torque (N m), world axes, from t on for d seconds
+//   gust t d <body> fx fy fz [tx ty tz]   the same, but it grows and fades: (1 - cos(2 pi s)) / 2 of the force at share s
 //   upright h a                        fallen, once the base is lower than h (m) or tilted by more than a (rad)
 //   drift t m                          from t on the centre of mass stays within m metres of where it was at t
 //   height t m  z d f                  from t on its height follows, with an rms error of m metres, height of the episode's first state

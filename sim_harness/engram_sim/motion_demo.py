@@ -45,6 +45,9 @@ def demo(args: argparse.Namespace, folder: Path) -> int:
     options = [word for option in args.plant_option for word in plant_option(option)]
     pair.plant_options = ["--log-full", str(LOG_FULL), "--log-every", str(LOG_EVERY), *script.plant_options, *options]
     code = pair.run(ended)
+    if "other task" in last_line(pair.folder / "controller.txt"):
+        print("\ndemo: the controller refused the tasks, it was built from another task.h; build it again: make setup")
+        return 1
     if code != 0:
         print(f"\ndemo: ended with exit code {code}:\n{pair.last_words()}")
         return 1

@@ -14,7 +14,7 @@ constexpr char kBox[] = R"(<mujoco><worldbody><body name="trunk"><freejoint/><ge
   </body></worldbody></mujoco>)";
 constexpr char kGood[] =
     "engram_scenario 1\nrobot_digest 0x12\ntask_digest 0x34\n# a comment\n"
-    "episode stand 2\nstate 0 0 1 0 0 0 1\ntask 0 0.5 0.25\ntask 1 0.75 0.5\npush 0.5 0.1 trunk 10 0 0\ngust 1 0.5 trunk 0 4 0\n"
+    "episode stand 2\nstate 0 0 1 0 0 0 1\ntask 0 0.5 0.25\ntask 1 0.75 0.5\npush 0.5 0.1 trunk 10 0 0\ngust 1 0.5 trunk 0 4 0  0 0 0.2\n"
     "upright 0.5 0.7\ndrift 0.5 0.01\nheight 1 0.02 0.1 0 0\npace 0.5 0.1 0 0 0\n"
     "episode walk 1\nstate 0 0 1 0 0 1 0\ntask 0 1\nupright 0.5 0.7\npace 0 0.1 1 0 0\n";
 
@@ -63,6 +63,7 @@ TEST_F(SimScenario, IsReadAsWritten) {
   EXPECT_EQ(trial.pushes[0].share(0.65), 0.0);
   EXPECT_NEAR(trial.pushes[1].share(1.25), 1.0, 1e-15);  // a gust is largest in its middle
   EXPECT_NEAR(trial.pushes[1].share(1.125), 0.5, 1e-15);
+  EXPECT_EQ(trial.pushes[1].torque[2], 0.2);
   EXPECT_FALSE(scenario.trials[1].drift.asked());
 }
 
@@ -74,7 +75,7 @@ TEST_F(SimScenario, FaultsNameTheirLine) {
   EXPECT_EQ(fault(""), "");
   EXPECT_TRUE(has(fault("psuh 0 1"), ":5: unknown key `psuh`")) << fault("psuh 0 1");
   EXPECT_TRUE(has(fault("push 0 0.1 head 1 0 0"), ":5: the scene has no body 'head'"));
-  EXPECT_TRUE(has(fault("push 0 0.1 trunk 1 0"), ":5: the form is `push t d body fx fy fz`"));
+  EXPECT_TRUE(has(fault("push 0 0.1 trunk 1 0"), ":5: the form is `push t d body fx fy fz"));
   EXPECT_TRUE(has(fault("push 0 0 trunk 1 0 0"), ":5: a push needs"));
   EXPECT_TRUE(has(fault("upright 0.5"), ":5: `upright` needs 2 numbers"));
   EXPECT_TRUE(has(fault("upright 0.5 nan"), ":5: not a finite number"));
