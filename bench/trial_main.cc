@@ -33,6 +33,7 @@ struct Model {
 };
 const Model kModels[] = {
     {&engram_talos_stand, "torso_2_joint", {"left_sole", "right_sole"}},
+    {&engram_talos_walk, "torso_2_joint", {"left_sole", "right_sole"}},
     {&engram_anymal_trot, "root_joint", {"lf_foot", "rf_foot", "lh_foot", "rh_foot"}},
 };
 
@@ -83,7 +84,7 @@ double capture_limit(const LeggedPlant& plant, const std::vector<const char*>& f
 
 int main(int argc, char** argv) {
   const Model* const chosen = argc > 1 ? find(argv[1]) : nullptr;
-  if (chosen == nullptr) bench::fail("usage: engram-trial talos_stand|anymal_trot [seconds=S] [heading=DEG] [task=S:V,...] [push=S:X,Y]");
+  if (chosen == nullptr) bench::fail("usage: engram-trial talos_stand|talos_walk|anymal_trot [seconds=S] [heading=DEG] [task=S:V,...] [push=S:X,Y]");
   if (argc == 3 && std::strcmp(argv[2], "limits") == 0) {
     const LeggedPlant plant(chosen->model, 0.0);
     constexpr double kWays[4][2] = {{1.0, 0.0}, {-1.0, 0.0}, {0.0, 1.0}, {0.0, -1.0}};

@@ -31,6 +31,9 @@ inline Placement moved(const Placement& from, double x, double y) {
   return to;
 }
 
+// The same angle, whole turns nearer to another.
+inline double nearest_turn(double angle, double to) { return angle + 2.0 * M_PI * std::round((to - angle) / (2.0 * M_PI)); }
+
 // Velocity of the body in its own axes [m/s, rad/s]; walk: feet swing.
 struct Pace {
   double vx = 0.0, vy = 0.0, wz = 0.0;
@@ -78,8 +81,9 @@ template <class G> class Gait {
     body_ = body;
     for (int f = 0; f < nfeet; ++f) {
       foot_[f] = feet[f];
+      foot_[f].yaw = nearest_turn(feet[f].yaw, body.yaw);
       const double dx = feet[f].p[0] - body.p[0], dy = feet[f].p[1] - body.p[1], c = std::cos(body.yaw), s = std::sin(body.yaw);
-      offset_[f] = {c * dx + s * dy, -s * dx + c * dy, feet[f].yaw - body.yaw};
+      offset_[f] = {c * dx + s * dy, -s * dx + c * dy, foot_[f].yaw - body.yaw};
     }
     support(0, foot_, zmp_);
     n_ = 0;
@@ -98,8 +102,12 @@ template <class G> class Gait {
     }
   }
 
-  // A standing foot is really here.
-  void measured(int f, const Placement& at) { foot_[f] = at; }
+  // A standing foot is really here. Headings grow beyond pi as the robot turns; a measured one does not.
+  void measured(int f, const Placement& at) {
+    const double yaw = nearest_turn(at.yaw, foot_[f].yaw);
+    foot_[f] = at;
+    foot_[f].yaw = yaw;
+  }
 
   // Plans `slots` slots from now on. push: how far every coming foothold moves [m], world x and y.
   void plan(const Pace& pace, int slots, const double (&push)[2] = {0.0, 0.0}) {

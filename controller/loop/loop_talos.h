@@ -4,6 +4,7 @@
 
 #include "controller/loop/loop_legged.h"
 #include "tables/talos_stand/task.h"
+#include "tables/talos_walk/task.h"
 
 namespace engram {
 
@@ -52,6 +53,20 @@ struct TalosStand : TalosBody<tasks::TalosStand, 50> {
     c.height = task[0];
     c.depth = task[1];
     c.rate = task[2];
+  }
+};
+
+// Walks at a commanded velocity, right foot first, or stands.
+struct TalosWalk : TalosBody<tasks::TalosWalk, 20> {
+  struct Gait {
+    static constexpr unsigned kLeft = 1u, kRight = 2u;
+    static constexpr int swing = static_cast<int>(Task::gait_swing), stance = static_cast<int>(Task::gait_stance);
+    static constexpr int nfeet = 2, nphases = 4, lead = static_cast<int>(Task::gait_lead);
+    static constexpr GaitPhase phase[nphases] = {{kRight, swing}, {0u, stance}, {kLeft, swing}, {0u, stance}};
+    static constexpr double slot = Task::dt, swing_height = Task::gait_height;
+  };
+  static void command(const double* task, LeggedCommand& c) {
+    if (task[3] > 0.5) c.pace = {task[0], task[1], task[2], true};
   }
 };
 

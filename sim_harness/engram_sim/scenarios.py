@@ -67,6 +67,16 @@ def talos_stand(spec: MotionSpec, seed: int, parts: int | None) -> Script:
     return scenario(spec, seed, episodes[:parts], "torso")
 
 
+def talos_walk(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """Walks of some 20 steps at three commands each, with turns and side steps; every walk ends standing."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    episodes = []
+    for n in range(parts or 5):
+        commands = [f"task {t} {numbers(rng.uniform([0.0, -0.06, -0.25], [0.4, 0.06, 0.25]))} 1" for t in (0.5, 5.5, 10.5)]
+        episodes.append([f"episode walk_{n + 1} 19", home(spec, YAWS[n % 4]), *commands, "task 15.5 0 0 0 0", "upright 0.6 0.7"])
+    return scenario(spec, seed, episodes, "torso")
+
+
 def anymal_trot(spec: MotionSpec, seed: int, parts: int | None) -> Script:
     """Standing, trotting in place and forward for a minute, and lateral pushes at random phases of the gait."""
     rng = np.random.default_rng([HELD_OUT, seed])
@@ -118,6 +128,7 @@ def hector_fly(spec: MotionSpec, seed: int, parts: int | None) -> Script:
 
 MOTIONS: dict[str, Callable[[MotionSpec, int, int | None], Script]] = {
     "talos_stand": talos_stand,
+    "talos_walk": talos_walk,
     "anymal_trot": anymal_trot,
     "hector_fly": hector_fly,
 }

@@ -88,6 +88,25 @@ TEST(GaitTest, AFootIsUnderTheBodyInTheMiddleOfItsStance) {
   EXPECT_GE(checked, 2);
 }
 
+// A robot that turns on and on: headings that are measured jump by a turn at pi, footholds must not.
+TEST(GaitTest, TurnsBeyondHalfATurn) {
+  const Pace turn = {0.0, 0.0, 0.5, true};
+  Gait<G> gait;
+  stand(gait, 3.0);
+  for (int slot = 0; slot < 200; ++slot) {
+    gait.advance(slot, turn);
+    for (int f = 0; f < 4 && gait.walking() && gait.age() == 1; ++f) {
+      if (!gait.stands(f)) continue;
+      Placement seen = gait.at(slot).from[f];
+      seen.yaw = std::atan2(std::sin(seen.yaw), std::cos(seen.yaw));
+      gait.measured(f, seen);
+    }
+    gait.plan(turn, 40);
+    for (int f = 0; f < 4; ++f) EXPECT_LT(std::fabs(gait.at(slot).to[f].yaw - gait.at(slot).from[f].yaw), 0.5) << slot;
+  }
+  EXPECT_GT(gait.body().yaw, 3.5);
+}
+
 TEST(Lipm, SolvesItsEquationAndIsBounded) {
   constexpr int n = 60;
   constexpr double dt = 0.02, z = 0.5;

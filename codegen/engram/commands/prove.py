@@ -8,7 +8,7 @@ import argparse
 import importlib
 
 EPILOG = """examples:
-  engram prove talos                    60 s of standing, squats, pushes at four headings, the largest pushes (some 5 minutes)
+  engram prove talos                    60 s of standing, squats, pushes, the largest pushes, walks (some 10 minutes)
   engram prove anymal --seed 7          60 s of standing and trotting, pushes at random phases
   engram prove talos --quick            a few seconds of each
   engram prove talos --cycles 100000    the same, and the times of so many control periods
