@@ -4,6 +4,9 @@
 #include "codegen/offline/study_costs.h"
 #include "codegen/offline/study_functions.h"
 #include "codegen/offline/tt_cross.h"
+#include "tables/panda/robot.h"
+#include "tables/planar3/robot.h"
+#include "tables/planar4/robot.h"
 
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/unique_ptr.h>
@@ -14,32 +17,57 @@ namespace {
 
 using offline::StudyCost;
 
-std::unique_ptr<StudyCost> arm(const std::string& name) {
+std::unique_ptr<StudyCost> arm(const std::string& name, const std::vector<double>& from, const std::vector<double>& to) {
   const auto dot = name.find('.');
   const std::string robot = name.substr(0, dot), what = dot == std::string::npos ? "" : name.substr(dot + 1);
-  std::unique_ptr<StudyCost> cost;
-  if (robot == "panda") cost = offline::panda_cost(what);
-  if (!cost) throw nb::value_error(("no such cost: '" + name + "'; there are panda.ik, panda.reach, panda.pick").c_str());
+  const offline::Ends ends{from, to};
+  std::unique_ptr<StudyCost> cost = robot == "panda"  ? offline::panda_cost(what, ends)
+                                    : robot == "ur10" ? offline::ur10_cost(what)
+                                                      : offline::planar_cost(robot, what, ends);
+  if (!cost) {
+    throw nb::value_error(("no such cost: '" + name + "'; robots: panda, ur10, planar3, planar4; costs: ik, reach, pick, transfer").c_str());
+  }
   return cost;
 }
 
-template <class F> std::unique_ptr<StudyCost> function(F f, std::vector<double> lo, std::vector<double> hi, int ntask, StudyCost::Form form) {
+template <class R> Out path_of(const double* q0, const double* q1, const double* w) {
+  NewArray q({std::size_t(offline::Primitive::kPoints), std::size_t(R::nq)});
+  offline::primitive_path<R>(q0, q1, w, q.data());
+  return q.release();
+}
+Out path(const std::string& robot, const In<1>& q0, const In<1>& q1, const In<1>& w) {
+  const auto sizes = [&](long nq) {
+    check_shape<1>("q0", q0, {nq});
+    check_shape<1>("q1", q1, {nq});
+    check_shape<1>("w", w, {offline::Primitive::kBasis * nq});
+  };
+  const auto of = [&](auto R) {
+    sizes(decltype(R)::nq);
+    return path_of<decltype(R)>(q0.data(), q1.data(), w.data());
+  };
+  if (robot == "panda") return of(robots::Panda{});
+  if (robot == "planar3") return of(robots::Planar3{});
+  if (robot == "planar4") return of(robots::Planar4{});
+  throw nb::value_error("robot: panda, planar3 or planar4");
+}
+
+template <class F> std::unique_ptr<StudyCost> function(F f, std::vector<double> lo, std::vector<double> hi, int ntask, int power, bool complement = false) {
   auto cost = std::make_unique<offline::StudyCostOf<F, double>>(std::move(f));
   cost->lo = std::move(lo);
   cost->hi = std::move(hi);
   cost->ntask = ntask;
-  cost->form = form;
+  cost->power = power;
+  cost->complement = complement;
   return cost;
 }
 
 std::unique_ptr<StudyCost> benchmark(const std::string& name, int d) {
-  using Form = StudyCost::Form;
-  if (name == "sinusoid") return function(offline::Sinusoid{}, {-2, -2}, {2, 2}, 0, Form::kComplement);
-  if (name == "himmelblau") return function(offline::Himmelblau{}, {0, 0, -5, -5}, {15, 15, 5, 5}, 2, Form::kSquare);
+  if (name == "sinusoid") return function(offline::Sinusoid{}, {-2, -2}, {2, 2}, 0, 2, true);
+  if (name == "himmelblau") return function(offline::Himmelblau{}, {0, 0, -5, -5}, {15, 15, 5, 5}, 2, 2);
   if (name == "rosenbrock" && d >= 2 && d % 2 == 0) {
     std::vector<double> lo(d + 2, -2.0), hi(d + 2, 2.0);
     lo[0] = -1.5, hi[0] = 1.5, lo[1] = 50, hi[1] = 150;
-    return function(offline::Rosenbrock{d + 2}, lo, hi, 2, Form::kSquare);
+    return function(offline::Rosenbrock{d + 2}, lo, hi, 2, 2);
   }
   throw nb::value_error("no such function: sinusoid, himmelblau, or rosenbrock with an even number of variables");
 }
@@ -52,7 +80,7 @@ std::unique_ptr<StudyCost> mixture(const In<1>& weight, const In<1>& sharpness, 
                                            {weight.data(), weight.data() + J},
                                            {sharpness.data(), sharpness.data() + J},
                                            {mean.data(), mean.data() + J * d}},
-                  std::vector<double>(d, -2.0), std::vector<double>(d, 2.0), 0, plain ? StudyCost::Form::kComplement : StudyCost::Form::kExponential);
+                  std::vector<double>(d, -2.0), std::vector<double>(d, 2.0), 0, 1, plain);
 }
 
 nb::tuple gradient(const StudyCost& cost, const In<2>& x) {
@@ -172,7 +200,8 @@ void bind_study(nb::module_& engine) {
       .def_ro("hi", &StudyCost::hi)
       .def_ro("ntask", &StudyCost::ntask)
       .def_prop_ro("d", &StudyCost::d)
-      .def_rw("scale", &StudyCost::scale, "Density: exp(-(scale C)^2), for costs that are not densities by nature.")
+      .def_rw("scale", &StudyCost::scale, "Density: exp(-(scale C)^power), for costs that are not densities by nature.")
+      .def_rw("power", &StudyCost::power, "1 or 2.")
       .def("evaluate", &evaluate, "x"_a, "Cost (m) at x (m, d).")
       .def("gradient", &gradient, "x"_a, "Cost (m) and gradient (m, d) at x (m, d).")
       .def("density", &density, "x"_a, "Density (m) at x (m, d).")
@@ -180,7 +209,9 @@ void bind_study(nb::module_& engine) {
            "x (m, d) with all but the task moved downhill by projected BFGS, and the cost (m) there.")
       .def("cross", &cross, "points"_a, "starts"_a, "rank"_a, "enrich"_a = 8, "sweeps"_a = 4, "tolerance"_a = 1e-8, "seed"_a = 1,
            "Cores of a tensor train of the density on a grid of `points`, grown from `starts` (m, d); and how many values it took.");
-  engine.def("study_arm", &arm, "name"_a, "Cost on a compiled robot: 'panda.ik', ...");
+  engine.def("study_arm", &arm, "name"_a, "from_"_a = std::vector<double>{}, "to"_a = std::vector<double>{},
+             "Cost on a compiled robot: 'panda.ik', ...; the ends of a 'transfer'.");
+  engine.def("study_path", &path, "robot"_a, "q0"_a, "q1"_a, "w"_a, "Points (m, nq) of the motion primitive from q0 to q1.");
   engine.def("study_function", &benchmark, "name"_a, "d"_a = 2, "A benchmark function.");
   engine.def("study_mixture", &mixture, "weight"_a, "sharpness"_a, "mean"_a, "plain"_a = false,
              "A mixture P of Gaussians (J), (J), (J, d) over [-2, 2]^d: as cost -log P, or 1 - P.");

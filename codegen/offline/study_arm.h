@@ -6,6 +6,8 @@
 #include "controller/rbd/rbd_frames.h"
 
 #include <array>
+#include <cmath>
+#include <vector>
 
 namespace engram::offline {
 
@@ -57,7 +59,8 @@ template <class S> ENGRAM_INLINE S length(const Vec3<S>& v, Vec3<S>& unit) {
   return n;
 }
 
-// Setup M: Robot, Field (count, distance), frame, orientation(): what the frame's axes cost; clearance [m] within which obstacles cost.
+// Setup M: Robot, Field (count, distance), frame, clearance [m] within which obstacles cost, orientation(): what the frame's axes cost;
+// `space`: dimensions of a target, 2 in the plane z = 0, where no orientation is asked for.
 template <class M, class S, bool slopes> struct ArmTerms {
   using R = typename M::Robot;
   using Posture = ArmPosture<R, S, slopes>;
@@ -89,12 +92,17 @@ template <class M, class S, bool slopes> struct ArmTerms {
     Mat3<S> R_WF;
     Vec3<S> p_WF, unit, moment;
     rbd_frame_placement(posture.d, M::frame, R_WF, p_WF);
-    S c = weight_p * length<S>(p_WF - Vec3<S>(target[0], target[1], target[2]), unit);
+    S c = weight_p * length<S>(p_WF - Vec3<S>(target[0], target[1], M::space == 3 ? target[2] : S(0.0)), unit);
     posture.push(joint, p_WF, unit * S(weight_p));
-    c += weight_R * M::template orientation<S>(R_WF, moment);
-    posture.twist(joint, moment * S(weight_R));
+    if constexpr (M::space == 3) {
+      c += weight_R * M::template orientation<S>(R_WF, moment);
+      posture.twist(joint, moment * S(weight_R));
+    }
     return c;
   }
+
+  // How many kinds of cost there are: position, and obstacles and orientation where they are asked for.
+  static constexpr int kinds = 1 + (M::Field::count > 0) + (M::space == 3);
 };
 
 // 1 - (a . z)^2: the frame's axis `a` is vertical, up or down; free about z (thesis B.3). moment: the gradient as a torque.
@@ -121,7 +129,7 @@ template <class S> S axes_of_world(const Mat3<S>& R_WF, Vec3<S>& moment) {
 // Inverse kinematics: x = (target p [m], q [rad]).  C = 1/m (C_p / 0.05 + C_obst / 0.01 + C_orient / 0.2), m = number of terms (B.3).
 template <class M> struct InverseKinematicsCost {
   using R = typename M::Robot;
-  static constexpr int ntask = 3, d = 3 + R::nq;
+  static constexpr int ntask = M::space, d = ntask + R::nq;
 
   template <class S> S operator()(const S* x, S* gradient) const {
     return gradient ? evaluate<true>(x, gradient) : evaluate<false>(x, gradient);
@@ -130,13 +138,13 @@ template <class M> struct InverseKinematicsCost {
  private:
   template <bool slopes, class S> static S evaluate(const S* x, S* gradient) {
     using Terms = ArmTerms<M, S, slopes>;
-    constexpr double share = M::Field::count > 0 ? 1.0 / 3 : 0.5;
-    typename Terms::Posture posture(x + 3);
+    constexpr double share = 1.0 / Terms::kinds;
+    typename Terms::Posture posture(x + ntask);
     S c = Terms::target(posture, x, share / 0.05, share / 0.2);
     if constexpr (M::Field::count > 0) c += Terms::obstacles(posture, share / 0.01);
     if constexpr (slopes) {
       for (int k = 0; k < d; ++k) gradient[k] = 0.0;
-      posture.add_gradient(gradient + 3);
+      posture.add_gradient(gradient + ntask);
     }
     return c;
   }
@@ -239,12 +247,12 @@ template <class M, class S, bool slopes> struct ArmMotion {
 };
 
 // Motions through `stops` targets, from the nominal posture and, if `home_again`, back to it (B.4):
-//   C = 1/4 (C_p / 0.05 + C_obst / 0.1 + C_orient / 0.2 + C_control / 2),   means over targets and motions
+//   C = 1/4 (C_p / 0.05 + C_obst / 0.1 + C_orient / 0.2 + C_control / 2),   means over targets and motions; in the plane 1/3, no C_orient
 // x = (targets [m], postures at them [rad], weights of each motion).
 template <class M, int stops, bool home_again> struct MotionCost {
   using R = typename M::Robot;
   static constexpr int nq = R::nq, nw = Primitive::kBasis * nq, motions = stops + (home_again ? 1 : 0);
-  static constexpr int ntask = 3 * stops, d = ntask + stops * nq + motions * nw;
+  static constexpr int ntask = M::space * stops, d = ntask + stops * nq + motions * nw;
 
   template <class S> S operator()(const S* x, S* gradient) const {
     return gradient ? evaluate<true>(x, gradient) : evaluate<false>(x, gradient);
@@ -252,6 +260,7 @@ template <class M, int stops, bool home_again> struct MotionCost {
 
  private:
   template <bool slopes, class S> static S evaluate(const S* x, S* gradient) {
+    constexpr double share = 1.0 / (1 + ArmTerms<M, S, slopes>::kinds);
     const S* posture_of = x + ntask;
     const S* weights_of = posture_of + stops * nq;
     S g[d];
@@ -259,7 +268,7 @@ template <class M, int stops, bool home_again> struct MotionCost {
     S c = 0.0;
     for (int i = 0; i < stops; ++i) {
       ArmPosture<R, S, slopes> posture(posture_of + i * nq);
-      c += ArmTerms<M, S, slopes>::target(posture, x + 3 * i, 0.25 / 0.05 / stops, 0.25 / 0.2 / stops);
+      c += ArmTerms<M, S, slopes>::target(posture, x + M::space * i, share / 0.05 / stops, share / 0.2 / stops);
       if constexpr (slopes) posture.add_gradient(g + ntask + i * nq);
     }
     for (int i = 0; i < motions; ++i) {
@@ -273,7 +282,7 @@ template <class M, int stops, bool home_again> struct MotionCost {
         motion.w[k] = weights_of[i * nw + k];
         motion.dw[k] = 0.0;
       }
-      c += motion.cost(0.25 / 0.1 / motions, 0.25 / 2 / motions);
+      c += motion.cost(share / 0.1 / motions, share / 2 / motions);
       if constexpr (!slopes) continue;
       for (int k = 0; k < nq; ++k) {
         if (i > 0) g[ntask + (i - 1) * nq + k] += motion.dq0[k];
@@ -286,6 +295,66 @@ template <class M, int stops, bool home_again> struct MotionCost {
     return c;
   }
 };
+
+// One motion between two given postures, its weights x alone to be found (B.6):
+//   C = 1/2 (C_obst / 0.1 + C_control / 2)
+template <class M> struct TransferCost {
+  using R = typename M::Robot;
+  static constexpr int ntask = 0, d = Primitive::kBasis * R::nq;
+  std::array<double, R::nq> from, to;
+
+  template <class S> S operator()(const S* x, S* gradient) const {
+    return gradient ? evaluate<true>(x, gradient) : evaluate<false>(x, gradient);
+  }
+
+ private:
+  template <bool slopes, class S> S evaluate(const S* x, S* gradient) const {
+    ArmMotion<M, S, slopes> motion;
+    for (int k = 0; k < R::nq; ++k) {
+      motion.q0[k] = from[k];
+      motion.q1[k] = to[k];
+      motion.dq0[k] = motion.dq1[k] = 0.0;
+    }
+    for (int k = 0; k < d; ++k) {
+      motion.w[k] = x[k];
+      motion.dw[k] = 0.0;
+    }
+    const S c = motion.cost(0.5 / 0.1, 0.5 / 2);
+    if constexpr (slopes)
+      for (int k = 0; k < d; ++k) gradient[k] = motion.dw[k];
+    return c;
+  }
+};
+
+// An arm's path as points q (kPoints, nq) of the motion primitive with ends q0, q1 and weights w.
+template <class R> void primitive_path(const double* q0, const double* q1, const double* w, double* q) {
+  constexpr int G = Primitive::kGrid, W = Primitive::kWindow;
+  for (int k = 0; k < R::nq; ++k) {
+    double z[G + 1];
+    for (int l = 0; l <= G; ++l) {
+      z[l] = q0[k] + kPrimitive.line[l] * (q1[k] - q0[k]);
+      for (int j = 0; j < Primitive::kBasis; ++j) z[l] += kPrimitive.phi[l][j] * w[Primitive::kBasis * k + j];
+      z[l] = min(max(z[l], double(R::q_lo[k])), double(R::q_hi[k]));
+    }
+    for (int o = 0; o < Primitive::kPoints; ++o) {
+      double sum = 0;
+      for (int l = o - W + 1; l <= o; ++l) sum += z[l < 0 ? 0 : l > G ? G : l];
+      q[o * R::nq + k] = sum / W;
+    }
+  }
+}
+
+// The box of a cost: `postures` times the joint limits, then `motions` times weights within the joint limits (thesis 7.5.3).
+template <class R> void append_joints(int postures, int motions, std::vector<double>& lo, std::vector<double>& hi) {
+  const auto joints = [&](int each) {
+    for (int k = 0; k < R::nq; ++k) {
+      lo.insert(lo.end(), each, R::q_lo[k]);
+      hi.insert(hi.end(), each, R::q_hi[k]);
+    }
+  };
+  for (int i = 0; i < postures; ++i) joints(1);
+  for (int i = 0; i < motions; ++i) joints(Primitive::kBasis);
+}
 
 }  // namespace engram::offline
 #endif  // CODEGEN_OFFLINE_STUDY_ARM_H_

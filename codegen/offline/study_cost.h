@@ -23,7 +23,7 @@ class StudyCost {
     evaluate(x, m, p, nullptr);
     for (std::size_t i = 0; i < m; ++i) {
       const double c = p[i];
-      p[i] = form == Form::kSquare ? std::exp(-scale * scale * c * c) : form == Form::kExponential ? std::exp(-c) : 1 - c;
+      p[i] = complement ? 1 - c : std::exp(-(power == 1 ? scale * c : scale * scale * c * c));
     }
   }
   // Moves the variables behind the task downhill, in place, with at most `evaluations` of cost and gradient; c (m): where it ends.
@@ -31,8 +31,9 @@ class StudyCost {
 
   std::vector<double> lo, hi;
   int ntask = 0;
-  enum class Form { kSquare, kExponential, kComplement } form = Form::kSquare;  // exp(-(scale C)^2), exp(-C), 1 - C
+  bool complement = false;  // density 1 - C instead of exp(-(scale C)^power)
   double scale = 1.0;
+  int power = 2;  // 1 or 2
 };
 
 // From a function object F: S F::operator()(const S* x, S* gradient), with a null gradient where it is not asked for.

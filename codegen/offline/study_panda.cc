@@ -11,6 +11,7 @@ struct PandaSetup {
   using Robot = robots::Panda;
   using Field = BoxField<tasks::PandaReach>;
   static constexpr int frame = Robot::kHandTcp;
+  static constexpr int space = 3;
   static constexpr double clearance = 0.02;
   // the hand lies level: its x axis, normal to approach and finger travel, is vertical
   template <class S> static S orientation(const Mat3<S>& R_WF, Vec3<S>& moment) { return vertical_axis<S>(R_WF.column(0), moment); }
@@ -28,20 +29,14 @@ template <class F> std::unique_ptr<StudyCost> bounded(int stops, int postures, i
     cost->lo.insert(cost->lo.end(), i == 0 ? kShelfLo : kBoxLo, (i == 0 ? kShelfLo : kBoxLo) + 3);
     cost->hi.insert(cost->hi.end(), i == 0 ? kShelfHi : kBoxHi, (i == 0 ? kShelfHi : kBoxHi) + 3);
   }
-  const auto joints = [&](int times_each) {
-    for (int k = 0; k < R::nq; ++k) {
-      cost->lo.insert(cost->lo.end(), times_each, R::q_lo[k]);
-      cost->hi.insert(cost->hi.end(), times_each, R::q_hi[k]);
-    }
-  };
-  for (int i = 0; i < postures; ++i) joints(1);
-  for (int i = 0; i < motions; ++i) joints(Primitive::kBasis);  // weights within the joint limits, as in the thesis
+  append_joints<R>(postures, motions, cost->lo, cost->hi);
   return cost;
 }
 
 }  // namespace
 
-std::unique_ptr<StudyCost> panda_cost(const std::string& what) {
+std::unique_ptr<StudyCost> panda_cost(const std::string& what, const Ends& ends) {
+  if (what == "transfer") return transfer_cost<PandaSetup>(ends);
   if (what == "ik") return bounded<InverseKinematicsCost<PandaSetup>>(1, 1, 0);
   if (what == "reach") return bounded<MotionCost<PandaSetup, 1, false>>(1, 1, 1);
   if (what == "pick") return bounded<MotionCost<PandaSetup, 2, true>>(2, 2, 3);

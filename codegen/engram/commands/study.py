@@ -3,7 +3,16 @@
 import argparse
 import os
 
-ROWS = {"6.1": "functions", "6.3": "panda"}
+ROWS = {
+    "6.1": "functions",
+    "6.2": "ur10",
+    "6.3": "panda",
+    "6.4": "panda",
+    "6.5": "panda",
+    "6.6": "sampling",
+    "6.7": "arms",
+    "6.8": "arms",
+}
 
 EXAMPLES = """examples:
   engram study 6.3              inverse kinematics of the Panda, table 7.1; build/figures/study.6.3.json

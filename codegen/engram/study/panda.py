@@ -10,7 +10,7 @@ from engram.engine import engine
 from engram.paths import MODELS
 from engram.study.report import Report
 from engram.study.trains import WORKERS, Recipe, build, samples
-from engram.study.warmstart import ALPHAS, Neighbours, compare, modes
+from engram.study.warmstart import ALPHAS, COUNTS, Neighbours, compare, modes
 from engram.tasks.world import read_boxes
 
 CLEARANCE = 0.06  # [m] of a target to the nearest obstacle: "sufficiently away from the surface" (thesis, caption of table 7.1)
@@ -40,6 +40,11 @@ class Study:
 STUDIES = {
     "6.3": Study("panda.ik", "inverse kinematics, Panda with table, box and shelf, d = 10 (table 7.1)",
                  Recipe(points=(40, 50), rank=16, enrich=16, sweeps=4, starts=2000), 400, 400, slice(3, 10)),
+    "6.4": Study("panda.reach", "target reaching, Panda with table, box and shelf, d = 24 (table 7.2)",
+                 Recipe(points=(40, 30), rank=16, scale=3.0, seeds=4, starts=3000, start_cost=0.2, evaluations=150), 100, 200,
+                 slice(3, 10)),
+    "6.5": Study("panda.pick", "pick and place, Panda with table, box and shelf, d = 62 (table 7.3)",
+                 Recipe(points=(30, 20), rank=12, scale=3.0, seeds=2, starts=3000, evaluations=300), 50, 100, slice(6, 20)),
 }  # fmt: skip
 
 
@@ -66,7 +71,7 @@ def run(row: str, quick: bool) -> None:
     recipe, ntest, nvalidation = study.recipe, study.test, study.validation
     if quick:
         recipe, ntest, nvalidation = replace(recipe, seeds=2, starts=recipe.starts // 3), 40, 40
-    counts = (1, 10, 100) if quick else (1, 10, 100, 1000)
+    counts = COUNTS[:-1] if quick else COUNTS
     cost = engine.study_arm(study.cost)
     draw = Tasks(cost)
     validation, test = draw(np.random.default_rng(1001), nvalidation), draw(np.random.default_rng(2002), ntest)
@@ -88,11 +93,10 @@ def run(row: str, quick: bool) -> None:
 
 def count_modes(report, cost, built, neighbours, tasks, evaluations: int, joints: slice) -> None:
     """Distinct solutions among 20 refined samples: what a train has and nearest neighbours have not."""
-    names = {0.9: "a09", 0.75: "a075", 0.5: "a05", 0.0: "a0"}
     parts = []
-    for alpha in ALPHAS:
+    for alpha, name in ALPHAS.items():
         found = modes(cost, samples(built.train, cost, tasks, alpha, 20), evaluations, joints)
-        report.figure(f"modes.{names[alpha]}", found, n=len(tasks))
+        report.figure(f"modes.{name}", found, n=len(tasks))
         parts.append(f"alpha {alpha:g}: {found:.1f}")
     found = modes(cost, np.stack([neighbours.starts(cost, task, 20) for task in tasks]), evaluations, joints)
     report.figure("modes.knn", found, n=len(tasks))

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from pathlib import Path
 
-from engram.learn.figures import write_figures
 from engram.paths import BUILD, relative
 
 
@@ -29,8 +29,9 @@ class Report:
         print(f"{self.row}:  {text}" if text else "", flush=True)
 
     def figure(self, what: str, value: float, unit: str = "1", n: int = 0, **more: float) -> None:
-        """A figure study.<row>.<what>."""
-        self.figures.append({"id": f"study.{self.row}.{what}", "value": value, "unit": unit, "n": n, **more})
+        """A figure study.<row>.<what>; a name that begins with bench. stands for itself."""
+        key = what if what.startswith("bench.") else f"study.{self.row}.{what}"
+        self.figures.append({"id": key, "value": value, "unit": unit, "n": n, **more})
 
     def picture(self, name: str) -> Path:
         """Where a picture goes."""
@@ -42,4 +43,6 @@ class Report:
 
     def close(self) -> None:
         """Write the figures."""
-        write_figures(f"study.{self.row}", [(f["id"], f["value"], f["unit"], f["n"]) for f in self.figures])
+        folder = BUILD / "figures"
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / f"study.{self.row}.json").write_text(json.dumps(self.figures, indent=1) + "\n", encoding="utf-8")

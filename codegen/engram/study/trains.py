@@ -25,10 +25,12 @@ class Recipe:
     enrich: int = 8
     sweeps: int = 3
     tolerance: float = 1e-3
-    scale: float = 1.0  # inside the density exp(-(scale C)^2)
+    scale: float = 1.0  # inside the density exp(-(scale C)^power)
+    power: int = 2
     type: str = "int8"
     seeds: int = 6
     starts: int = 600  # tasks from whose solutions the trains grow
+    start_cost: float = SOLVED  # of a solution, at most
     uniform: int = 20  # uniform points per starting task, of which the best is refined
     evaluations: int = 200  # of cost and gradient in one refinement
 
@@ -71,10 +73,10 @@ def lowest(cost: engine.StudyCost, x: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 
 def solutions(cost: engine.StudyCost, tasks: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
-    """Solved points (m, d): the best of some uniform points of each task, refined; those that are no solution are left out."""
+    """Solved points (m, d): the best of some uniform points of each task, refined; those above the start cost are left out."""
     start, _ = lowest(cost, uniform_points(cost, tasks, recipe.uniform, rng))
     refined, c = cost.refine(start, recipe.evaluations)
-    return refined[c <= SOLVED]
+    return refined[c <= recipe.start_cost]
 
 
 def samples(train: engine.TensorTrain, cost: engine.StudyCost, tasks: np.ndarray, alpha: float, count: int) -> np.ndarray:
@@ -95,13 +97,13 @@ def build(
     alpha: float = 0.9,
 ) -> Built:
     """The train of the seed whose single samples with priority alpha succeed most often on the validation tasks."""
-    cost.scale = recipe.scale
+    cost.scale, cost.power = recipe.scale, recipe.power
     cpu, wall = time.process_time(), time.perf_counter()
     points = [recipe.points[0]] * cost.ntask + [recipe.points[1]] * (cost.d - cost.ntask)
+    rng = np.random.default_rng(1)
+    starts = solutions(cost, draw(rng, recipe.starts), recipe, rng)
 
     def one(seed: int) -> tuple[float, int, list[np.ndarray], Tt, engine.TensorTrain]:
-        rng = np.random.default_rng(seed)
-        starts = solutions(cost, draw(rng, recipe.starts), recipe, rng)
         cores, values = cost.cross(points, starts, recipe.rank, recipe.enrich, recipe.sweeps, recipe.tolerance, seed)
         table = table_of(cost, cores, recipe.type)
         train = engine.TensorTrain(table, 1000)

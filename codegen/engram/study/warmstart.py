@@ -11,7 +11,7 @@ from engram.study.report import Report, wilson
 from engram.study.trains import SOLVED, Built, lowest, samples, solutions, uniform_points
 
 COUNTS = (1, 10, 100, 1000)
-ALPHAS = (0.9, 0.75, 0.5, 0.0)
+ALPHAS = {0.97: "a097", 0.9: "a09", 0.75: "a075", 0.5: "a05", 0.0: "a0"}  # priorities and their names in figures
 CHUNK = 50  # tasks whose points are held at a time
 
 
@@ -99,7 +99,6 @@ def compare(
     counts: tuple[int, ...] = COUNTS,
 ) -> None:
     """Prints the table beside the thesis' and files its figures. alpha is chosen for each count on the validation tasks."""
-    names = {0.9: "a09", 0.75: "a075", 0.5: "a05", 0.0: "a0"}
     report.say(f"{'start: best of':<22}" + "".join(f"{n:>24}" for n in counts))
     report.say(f"{'':<22}" + "    c_i   c_f    % thesis" * len(counts))
 
@@ -112,13 +111,13 @@ def compare(
 
     chosen = {}
     by_alpha = {}
-    for alpha in ALPHAS:
+    for alpha, name in ALPHAS.items():
         for n in counts:
             row = of_train(built, cost, validation, alpha, n, evaluations)
             if n not in chosen or (row.success, -row.end) > chosen[n][0]:
                 chosen[n] = ((row.success, -row.end), alpha)
         by_alpha[alpha] = [of_train(built, cost, test, alpha, n, evaluations) for n in counts]
-        line(f"train, alpha {alpha:g}", names[alpha], by_alpha[alpha], thesis.get(names[alpha]))
+        line(f"train, alpha {alpha:g}", name, by_alpha[alpha], thesis.get(name))
     best = [by_alpha[chosen[n][1]][i] for i, n in enumerate(counts)]
     line("train, alpha chosen", "best", best, thesis.get("a09"))
     line("uniform", "uniform", [of_uniform(cost, test, n, evaluations, 7) for n in counts], thesis.get("uniform"))
