@@ -44,7 +44,8 @@ STUDIES = {
                  Recipe(points=(40, 30), rank=16, scale=3.0, seeds=4, starts=3000, start_cost=0.2, evaluations=150), 100, 200,
                  slice(3, 10)),
     "6.5": Study("panda.pick", "pick and place, Panda with table, box and shelf, d = 62 (table 7.3)",
-                 Recipe(points=(30, 20), rank=12, scale=3.0, seeds=2, starts=3000, evaluations=300), 50, 100, slice(6, 20)),
+                 Recipe(points=(30, 20), rank=8, scale=2.0, enrich=4, sweeps=2, seeds=2, starts=2000, evaluations=300), 50, 100,
+                 slice(6, 20)),
 }  # fmt: skip
 
 
