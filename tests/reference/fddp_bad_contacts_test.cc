@@ -1,3 +1,4 @@
+// options: -O1
 // Contacts that cannot hold end as a status, never as a number that is none.
 #include "controller/fddp/fddp_solve.h"
 #include "controller/ocp/ocp_contact.h"

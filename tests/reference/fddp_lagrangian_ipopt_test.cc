@@ -1,4 +1,5 @@
 // link: engram_offline
+// options: -O1
 // An arm under equalities and inequalities: the augmented Lagrangian's optimum against Ipopt's.
 #include "bench/problems.h"
 #include "codegen/offline/ipopt_shooting.h"
