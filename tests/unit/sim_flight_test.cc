@@ -3,6 +3,7 @@
 #include "sim_harness/sim_flight.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -21,7 +22,7 @@ constexpr char kSkewed[] = R"(<mujoco><compiler inertiafromgeom="false"/><option
     <motor site="c" gear="0 0 1 0 0 -0.1" ctrllimited="true" ctrlrange="0 20"/></actuator></mujoco>)";
 
 std::string skewed_scene() {
-  const std::string path = ::testing::TempDir() + "sim_flight_test.xml";
+  const std::string path = ::testing::TempDir() + std::to_string(getpid()) + "sim_flight_test.xml";
   std::FILE* file = std::fopen(path.c_str(), "w");
   std::fputs(kSkewed, file);
   std::fclose(file);

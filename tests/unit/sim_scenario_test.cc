@@ -3,6 +3,7 @@
 #include "sim_harness/sim_scenario.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <cmath>
 #include <fstream>
@@ -19,7 +20,7 @@ constexpr char kGood[] =
     "episode walk 1\nstate 0 0 1 0 0 1 0\ntask 0 1\nupright 0.5 0.7\npace 0 0.1 1 0 0\n";
 
 std::string written(const char* name, const std::string& text) {
-  const std::string path = ::testing::TempDir() + name;
+  const std::string path = ::testing::TempDir() + std::to_string(getpid()) + name;
   std::ofstream(path) << text;
   return path;
 }
