@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct AnymalTrot {
   using Robot = robots::Anymal;
   static constexpr char name[] = "anymal_trot";
-  static constexpr uint64_t digest = 0x77545358ef2a7eaa;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x46ea63cdfe14b8e8;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 4;
@@ -53,7 +53,7 @@ struct AnymalTrot {
   static constexpr double gait_height = 0x1.eb851eb851eb8p-5;  // 0.06
   static constexpr double gait_swing_weight = 0x1.86ap+16;  // 100000
   static constexpr double gait_landing = 0x1.ep+4;  // 30
-  static constexpr double gait_capture = 0x1p+0;  // 1
+  static constexpr double gait_capture = 0x1.6666666666666p-1;  // 0.7
   static constexpr double gait_push_rate = 0x1.8p+0;  // 1.5
   static constexpr double gait_push_reach = 0x1p-2;  // 0.25
 
