@@ -27,7 +27,7 @@ def test_what_counts_as_standing() -> None:
     assert not series(trial, 250).stands  # cut short: fallen
     assert not series(trial, 300, up=np.linspace(1.0, 0.5, 300)).stands
     assert not series(trial, 300, cost=np.full(300, np.nan)).stands
-    stepped = series(trial, 300, slip=np.full(300, 0.06))
+    stepped = series(trial, 300, slip=np.full(300, 0.021))
     assert stepped.stands and not stepped.stays
 
 
