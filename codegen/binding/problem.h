@@ -62,7 +62,7 @@ template <class P_, int N_> class Problem {
     for (std::size_t k = 0; k <= T; ++k) {
       P::difference(s().x[k], x_next, f);
       unpad(f, ndx, gap.row(k));
-      if (k < T) P::calc(h().knot[k], s().x[k], s().u[k], x_next, *cost.row(k));
+      if (k < T) calc(k, x_next, *cost.row(k));
       else P::calc_terminal(h().knot[k], s().x[k], *cost.row(k));
     }
     nb::dict result;
@@ -130,13 +130,15 @@ template <class P_, int N_> class Problem {
     return merit.release();
   }
 
-  nb::dict solve(const In<2>& xs, const In<2>& us, int iterations, double stop, bool box, int step_lengths, double reg) {
+  nb::dict solve(const In<2>& xs, const In<2>& us, int iterations, double stop, bool box, int step_lengths, double reg,
+                 double stop_gradient) {
     if (step_lengths < 1 || step_lengths > kMaxStepLengths)
       throw nb::value_error(("step_lengths: expected 1 .. " + std::to_string(kMaxStepLengths)).c_str());
     load(xs, us);
     FddpOpts opts;
     opts.iterations = iterations;
     opts.stop = stop;
+    opts.stop_gradient = stop_gradient;
     opts.box = box;
     opts.step_lengths = step_lengths;
     opts.reg_init = reg;
@@ -146,11 +148,11 @@ template <class P_, int N_> class Problem {
       fddp_solve(h(), opts, w(), s(), stats);
     }
     const std::size_t logged = std::min(stats.iterations, int(FddpStats::kLog));
-    NewArray log({logged, 5});
+    NewArray log({logged, 6});
     for (std::size_t i = 0; i < logged; ++i) {
       const FddpIteration& it = stats.log[i];
-      const double row[] = {it.cost, it.stop, it.step_length, it.reg, it.gap};
-      std::copy_n(row, 5, log.row(i));
+      const double row[] = {it.cost, it.stop, it.step_length, it.reg, it.gap, it.gradient};
+      std::copy_n(row, 6, log.row(i));
     }
     nb::dict result = solution();
     result["K"] = gains();
@@ -221,6 +223,12 @@ template <class P_, int N_> class Problem {
     std::copy_n(us.data(), us.size(), s().u[0]);
   }
 
+  // Next state and cost of knot k of the trajectory that is loaded.
+  void calc(std::size_t k, double* x_next, double& cost) {
+    if constexpr (P::kPhases) P::calc(h().phase[k], h().knot[k], s().x[k], s().u[k], x_next, cost);
+    else P::calc(h().knot[k], s().x[k], s().u[k], x_next, cost);
+  }
+
   void linearize_at_solution() {
     fddp_start(FddpOpts{}, w(), state_->stats);
     if (!fddp_linearize(h(), s(), w())) throw nb::value_error("cost or gaps are not finite");
@@ -259,9 +267,9 @@ template <class C, class Class> void bind_problem(Class& c) {
            "Gains K (T, nu, ndx) and feed-forward k (T, nu) at a trajectory.")
       .def("merit", &C::merit, "xs"_a, "us"_a, "Merits (m) of m trajectories: cost + 10 L1 norm of the gaps.")
       .def("solve", &C::solve, "xs"_a, "us"_a, "iterations"_a = 100, "stop"_a = FddpOpts{}.stop, "box"_a = FddpOpts{}.box,
-           "step_lengths"_a = FddpOpts{}.step_lengths, "reg"_a = FddpOpts{}.reg_init,
+           "step_lengths"_a = FddpOpts{}.step_lengths, "reg"_a = FddpOpts{}.reg_init, "stop_gradient"_a = FddpOpts{}.stop_gradient,
            "FDDP from a guess: xs, us, K (T, nu, ndx), cost, status in words, converged, feasible, iterations, and the log "
-           "(iterations, 5) with columns cost, stop, step_length, reg, gap. Releases the GIL; one solve at a time per object.");
+           "(iterations, 6) with columns cost, stop, step_length, reg, gap, gradient. stop_gradient > 0 replaces stop: sum |Qu|^2. Releases the GIL; one solve at a time per object.");
 }
 
 }  // namespace engram::binding

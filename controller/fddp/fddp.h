@@ -36,6 +36,7 @@ struct FddpThreads {
 struct FddpOpts {
   int iterations = 100;       // at most
   double stop = 1e-9;         // on |expected improvement of a full step|
+  double stop_gradient = 0.0; // more than 0: on sum_k |Qu_k|^2 instead, at a trajectory without gaps (thesis, chapter 4)
   bool box = false;           // keep u within [u_lo, u_hi] of the problem
   int step_lengths = 10;      // line search tries 1, 1/2, 1/4, ... at most this many (1 .. kMaxStepLengths)
   double reg_init = 1e-9;     // added to the diagonals of Quu and Vxx
@@ -65,6 +66,7 @@ struct FddpIteration {
   double step_length = 0.0;  // 0: none accepted
   double reg = 0.0;          // regularization after the iteration
   double gap = 0.0;          // L1 norm of the gaps before the step
+  double gradient = 0.0;     // sum_k |Qu_k|^2 before the step
 };
 
 struct FddpStats {
@@ -122,6 +124,7 @@ template <class P, int N> struct FddpWork {
   // written by fddp_backward
   alignas(64) double k[N][L::nup];        // feed-forward: u = u_k - alpha k - K dx                          (nu)
   alignas(64) double Vf[N + 1][L::nxp];   // Vxx f                                                           (ndx)
+  double gradient;                        // sum_k |Qu_k|^2
   double dg, dq;                          // first and second order of the expected improvement without the term of the rollout
   alignas(64) double Vx0[L::nxp];         // value gradient, dg and dq at the first knot before its gap: what fddp_feedback
   double dg0, dq0;                        // starts from when the measured state moves that gap

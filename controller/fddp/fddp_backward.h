@@ -141,6 +141,7 @@ template <class P, int N> bool gains(int k, const FddpOpts& opts, FddpWork<P, N>
     std::memcpy(w.Y[i], w.Q[ou + i], nxp * sizeof(double));
   }
   double gain1 = 0.0, gain2 = 0.0;  // k' Qu and k' Quu k
+  for (int i = 0; i < nu; ++i) w.gradient += Qu[i] * Qu[i];
   if (opts.box) {
     if (!fddp_box(s.u[k], w, inv, w.k[k])) return false;
     for (int i = 0; i < nu; ++i) {
@@ -188,10 +189,10 @@ template <class P, int N> void close_value(FddpWork<P, N>& w) {
   for (int i = 0; i < L::ndx; ++i) w.Vxx[padded_index<L>(i)][padded_index<L>(i)] += w.reg;
 }
 
-// Fills w.k, w.Vf, w.dg, w.dq and s.K. False if the regularization is too small for a descent direction.
+// Fills w.k, w.Vf, w.dg, w.dq, w.gradient and s.K. False if the regularization is too small for a descent direction.
 template <class P, int N>
 bool fddp_backward(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s) {
-  w.dg = w.dq = 0.0;
+  w.dg = w.dq = w.gradient = 0.0;
   copy_hessian_x(w.model[h.n], w.Vxx);
   if constexpr (P::kPhases) add_coupled_hessian<P::Layout::nxp>(w.model[h.n], w.Vxx);
   std::memcpy(w.Vx, w.model[h.n].Lz, sizeof(w.Vx));

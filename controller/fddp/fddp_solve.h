@@ -61,6 +61,7 @@ bool fddp_step(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, 
   FddpTimer timer(opts, stats.us[kRollout]);
   FddpIteration log;
   log.gap = w.gap;
+  log.gradient = w.gradient;
   bool accepted = false;
   double alpha = 1.0, tried = 1.0;
   for (int first = 0; first < opts.step_lengths && !accepted; first += kLanes) {
@@ -109,9 +110,12 @@ FddpStatus fddp_solve(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, 
     if (opts.budget_us > 0.0 && begin - start + slowest > opts.budget_us) return stats.status = FddpStatus::kDeadline;
     const FddpStatus direction = fddp_direction(h, opts, relinearize, w, s, stats);
     if (direction != FddpStatus::kIterationLimit) return stats.status = direction;
+    const bool closed = w.feasible;  // before the step
     relinearize = fddp_step(h, opts, w, s, stats);
     if (w.reg >= opts.reg_max) return stats.status = FddpStatus::kNotPositiveDefinite;
-    if (w.feasible && stats.last().stop < opts.stop) return stats.status = FddpStatus::kConverged;
+    const FddpIteration& last = stats.last();
+    if (opts.stop_gradient > 0.0 ? closed && last.gradient < opts.stop_gradient : w.feasible && last.stop < opts.stop)
+      return stats.status = FddpStatus::kConverged;
     slowest = std::fmax(slowest, opts.now() - begin);
   }
   return stats.status = FddpStatus::kIterationLimit;

@@ -38,7 +38,8 @@ template <class P, int N> void loop_merit(const Horizon<P, N>& h, Candidate<P>* 
       if (k < h.n) {
         for (int i = 0; i < P::nu; ++i)
           for (int l = 0; l < kLanes; ++l) u[i].l[l] = c[l]->u[k][i];
-        P::calc(knot, x, u, x_next, cost_k);
+        if constexpr (P::kPhases) P::calc(h.phase[k], knot, x, u, x_next, cost_k);
+        else P::calc(knot, x, u, x_next, cost_k);
       } else {
         P::calc_terminal(knot, x, cost_k);
       }

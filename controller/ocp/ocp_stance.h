@@ -1,10 +1,10 @@
-// Torques that hold a robot at rest on its contacts.
+// Torques of a robot on its contacts: those that hold it at rest, or those that move it along.
 //
 //   g = B u + J' lambda, base rows:   J_b' lambda = g_b,   lambda = W J_b (J_b' W J_b + eps 1)^-1 g_b        least lambda' W^-1 lambda
 //   driven rows:                      u = g_u - J_u' lambda
 //
-// W = 1 for forces and kLever^2 for moments. Where the contacts cannot carry the weight (two points under a body that would tip about
-// their line), eps leaves what they cannot do undone.
+// g: gravity, or M a + b. W = 1 for forces and kLever^2 for moments. Where the contacts cannot carry the weight (two points under a body
+// that would tip about their line), eps leaves what they cannot do undone.
 #ifndef CONTROLLER_OCP_OCP_STANCE_H_
 #define CONTROLLER_OCP_OCP_STANCE_H_
 
@@ -15,19 +15,15 @@
 
 namespace engram {
 
-// u (nu) [N m] for the posture q (nq) on the contacts of the mask `active`. P: a problem with contacts whose controls drive the last dofs.
-template <class P> void stance_torques(const double* q, unsigned active, double* u) {
-  using R = typename P::R;
+// u (nu) [N m] from g (nv), which is overwritten, on the contacts of the mask `active`; d holds the kinematics. P: a problem with contacts
+// whose controls drive the last dofs.
+template <class P> void torques_on_contacts(const RbdData<typename P::R, double>& d, unsigned active, double (&g)[P::nv], double* u) {
   using C = typename P::Contacts;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
   constexpr double kLever2 = 0.1 * 0.1;  // m^2
   constexpr int first = P::nv - P::nu;
   static_assert(P::kFreeBase, "a robot that stands");
-  RbdData<R, double> d;
   ContactData<C, double> cd;
-  double g[P::nv];
-  rbd_kinematics<R>(q, d);
-  rbd_gravity<R>(d, g);
   rbd_contact_jacobians<C>(d, active, cd);
   const auto weight = [](int row) { return row < 3 ? 1.0 : kLever2; };
   Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
@@ -46,6 +42,23 @@ template <class P> void stance_torques(const double* q, unsigned active, double*
       for (int a = 0; a < tree.path_n[c]; ++a) g[tree.path[c][a]] -= motion_entry(cd.J[c][a], r) * lambda;
     }
   for (int i = 0; i < P::nu; ++i) u[i] = g[first + i];
+}
+
+// At rest in the posture q (nq).
+template <class P> void stance_torques(const double* q, unsigned active, double* u) {
+  RbdData<typename P::R, double> d;
+  double g[P::nv];
+  rbd_kinematics<typename P::R>(q, d);
+  rbd_gravity<typename P::R>(d, g);
+  torques_on_contacts<P>(d, active, g, u);
+}
+
+// At (q, v) (nq, nv) with the acceleration a (nv).
+template <class P> void inverse_dynamics_on_contacts(const double* q, const double* v, const double* a, unsigned active, double* u) {
+  RbdData<typename P::R, double> d;
+  double g[P::nv];
+  rbd_rnea<typename P::R>(q, v, a, d, g);
+  torques_on_contacts<P>(d, active, g, u);
 }
 
 }  // namespace engram

@@ -64,7 +64,7 @@ def test_log_tells_the_solve():
     arm = engine.Arm(30)
     cold = arm.cold_start()
     found = arm.solve(cold["xs"], cold["us"])
-    assert found["log"].shape == (found["iterations"], 5)
+    assert found["log"].shape == (found["iterations"], 6)
     assert found["log"][-1, 0] == found["cost"] and found["feasible"]
     evaluated = arm.evaluate(found["xs"], found["us"])
     assert np.isclose(evaluated["cost"].sum(), found["cost"], rtol=1e-12)

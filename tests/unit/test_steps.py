@@ -1,0 +1,107 @@
+"""Steps of Talos: the planner follows its references, the solver lands the foot, frames do not matter, bad feet are refused."""
+
+import numpy as np
+import pytest
+
+from engram.data import steps
+from engram.engine import engine
+
+NQ = 39
+
+
+@pytest.fixture(scope="module")
+def problem():
+    return engine.TalosSteps()
+
+
+def solve(problem, feet, goals, foot, **options) -> dict:
+    problem.set(feet, goals, foot)
+    planned = problem.planned()
+    return problem.solve(planned["xs"], planned["us"], stop=1e-8, **options)
+
+
+def task(foot: int, i: int) -> tuple[np.ndarray, np.ndarray]:
+    x = steps.draw(3, foot, i)
+    return x[:6].reshape(2, 3), x[None, 6:]
+
+
+@pytest.mark.parametrize("foot", [0, 1])
+def test_a_step_is_planned_and_solved(problem, foot):
+    feet, goal = task(foot, 0)
+    problem.set(feet, goal, foot)
+    planned = problem.planned()
+    seen, wanted = problem.feet(planned["xs"][:, :NQ])
+    # to the softness of the planner's weights; z and headings too
+    np.testing.assert_allclose(seen, wanted, atol=2e-3)
+    found = problem.solve(planned["xs"], planned["us"], stop=1e-8)
+    assert found["converged"] and found["feasible"]
+    seen, _ = problem.feet(found["xs"][:, :NQ])
+    np.testing.assert_allclose(seen[-1, foot, [0, 1, 3]], goal[0], atol=5e-3)  # the weight of the landing against all others
+    standing = seen[:, 1 - foot]
+    assert np.abs(standing - standing[0]).max() < 2e-3  # contacts hold velocities, not places: knots of 40 ms drift
+    moves = seen[problem.before : problem.before + problem.swing, foot, 2]
+    assert moves.max() > 0.04  # of 0.06 m
+    assert found["cost"] < problem.evaluate(planned["xs"], planned["us"])["cost"].sum()
+
+
+def test_frames_do_not_matter(problem):
+    feet, goal = task(0, 1)
+    here = solve(problem, feet, goal, 0)
+    frame = np.array([3.0, -2.0, 2.5])
+    there = solve(problem, steps.place(frame, feet), steps.place(frame, goal), 0)
+    assert there["cost"] == pytest.approx(here["cost"], rel=1e-6)
+    start = np.repeat(here["xs"][:1, :NQ], len(here["xs"]), 0)
+    start_there = np.repeat(there["xs"][:1, :NQ], len(there["xs"]), 0)
+    moved = problem.difference(start, np.ascontiguousarray(here["xs"][:, :NQ]))
+    moved_there = problem.difference(start_there, np.ascontiguousarray(there["xs"][:, :NQ]))
+    np.testing.assert_allclose(moved_there, moved, atol=1e-4)  # both have stopped within 1e-8 of cost
+    np.testing.assert_allclose(steps.step_vector(steps.place(frame, feet), steps.place(frame, goal[0])),
+                               steps.step_vector(feet, goal[0]), atol=1e-12)  # fmt: skip
+
+
+def test_rule_of_the_thesis_needs_two_iterations_at_the_optimum(problem):
+    feet, goal = task(1, 2)
+    found = solve(problem, feet, goal, 1)
+    again = problem.solve(found["xs"], found["us"] + 1e-9, iterations=20, stop_gradient=1e-2)
+    assert again["converged"] and again["iterations"] <= 2
+    assert again["log"][-1, 5] < 1e-2
+    cold = problem.cold()
+    far = problem.solve(cold["xs"], cold["us"], iterations=20, stop_gradient=1e-2)
+    assert far["iterations"] > 2 and np.all(far["log"][1:-1, 5] >= 1e-2)  # the first one had gaps
+
+
+def test_three_steps(problem):
+    feet, goals, first = steps.draw_walk(5, 3, 0)
+    found = solve(problem, feet, goals, first)
+    assert found["converged"] and len(found["us"]) == 3 * problem.knots
+    seen, _ = problem.feet(found["xs"][:, :NQ])
+    for i, goal in enumerate(goals):
+        np.testing.assert_allclose(seen[(i + 1) * problem.knots, (first + i) % 2, [0, 1, 3]], goal, atol=5e-3)
+    assert len(problem.stances()) == 4
+
+
+def test_tasks_stay_within_their_ranges_and_depend_on_seed_foot_and_number_alone():
+    for foot in (0, 1):
+        x = np.array([steps.draw(1, foot, i) for i in range(200)]).reshape(-1, 3, 3)
+        standing = x[:, 1 - foot]
+        seen = np.array([steps.seen_from(frame, poses[[foot, 2]]) for frame, poses in zip(standing, x, strict=True)])
+        mirror = np.array([1, 1, 1]) if foot == 0 else np.array([1, -1, -1])
+        seen = seen * mirror
+        assert np.all(seen[:, 0] >= steps.START_LO - 1e-12) and np.all(seen[:, 0] <= steps.START_HI + 1e-12)
+        assert np.all(seen[:, 1] >= steps.GOAL_LO - 1e-12) and np.all(seen[:, 1] <= steps.GOAL_HI + 1e-12)
+    np.testing.assert_array_equal(steps.draw(1, 0, 7), steps.draw(1, 0, 7))
+    assert np.abs(steps.draw(1, 0, 7) - steps.draw(2, 0, 7)).max() > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("feet", "goals", "first", "what"),
+    [
+        ([[0, 3.0, 0], [0, -3.0, 0]], [[0, 0, 0]], 0, "too far apart"),
+        ([[0, np.nan, 0], [0, -0.1, 0]], [[0, 0.1, 0]], 0, "not finite"),
+        ([[0, 0.1, 0], [0, -0.1, 0]], [[0, 0.1, 0]] * 4, 0, "expected 1 .. 3 steps"),
+        ([[0, 0.1, 0], [0, -0.1, 0]], [[0, 0.1, 0]], 2, "first"),
+    ],
+)
+def test_bad_feet_are_refused(problem, feet, goals, first, what):
+    with pytest.raises(ValueError, match=what):
+        problem.set(np.array(feet, float), np.array(goals, float), first)
