@@ -18,8 +18,7 @@ using namespace engram;
 using Task = tasks::PandaReach;
 constexpr int N = Task::nknots, nq = Task::Robot::nq, nx = nq + Task::Robot::nv;
 constexpr int kNearest = 10;
-constexpr MemoryTables kTables{&panda_reach_knn_v1, &panda_reach_gpr_v1, &panda_reach_bow_v1, &panda_reach_time_v1,
-                               &panda_reach_trust_v1, &panda_reach_gmr_v1};
+constexpr MemoryTables kTables = PANDA_REACH_MEMORY;
 
 struct Query {
   const double *near, *between;  // features of the k-NN, of the regression

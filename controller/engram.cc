@@ -55,7 +55,7 @@ constexpr const char* kStatuses[] = {
     "bad task",   "task far",  "bad state", "stale state", "stale plan",
 };
 constexpr const char* kRungs[] = {"plan", "shifted", "hold", "damping", "off"};
-constexpr const char* kCandidates[] = {"shifted", "knn", "gpr", "gmr", "line", "cold"};
+constexpr const char* kCandidates[] = {"shifted", "knn", "gpr", "gmr", "line", "cold", "tt", "mlp"};
 static_assert(size_of(kErrors) == ENGRAM_ERROR_TABLES + 1, "a text for every error");
 static_assert(size_of(kStatuses) == ENGRAM_STATUS_COUNT && size_of(kRungs) == ENGRAM_RUNG_COUNT &&
                   size_of(kCandidates) == ENGRAM_CANDIDATE_COUNT,

@@ -28,7 +28,7 @@ extern "C" {
 #define ENGRAM_NX_MAX 128     // bound on nq + nv of any model
 #define ENGRAM_NTASK_MAX 32   // bound on the length of a task vector
 #define ENGRAM_KNOTS_MAX 64   // bound on the knots of a plan
-#define ENGRAM_GUESSES_MAX 24 // bound on the candidates of one cycle
+#define ENGRAM_GUESSES_MAX 32 // bound on the candidates of one cycle
 
 typedef struct engram_controller engram_controller;  // one controller, living in the caller's memory
 typedef struct engram_model engram_model;            // one robot, task and memory, compiled in; read-only
@@ -119,6 +119,8 @@ typedef enum engram_candidate {
   ENGRAM_CANDIDATE_GMR,          // a mode of a mixture of motions
   ENGRAM_CANDIDATE_LINE,         // straight line in joint space to an inverse kinematics solution
   ENGRAM_CANDIDATE_COLD,         // stand still under gravity torque
+  ENGRAM_CANDIDATE_TT,           // a posture sampled from a tensor train, and the way there by regression
+  ENGRAM_CANDIDATE_MLP,          // a mode of a mixture density network, or the answer of a network
   ENGRAM_CANDIDATE_COUNT
 } engram_candidate;
 const char* engram_candidate_text(engram_candidate candidate);
@@ -212,6 +214,7 @@ typedef struct engram_cycle {
   int32_t npath;                          // used rows of path
   double path[ENGRAM_KNOTS_MAX][3];       // m, planned hand position in the world, one row per knot
   double query_us, candidates_us, linearize_us, backward_us, rollout_us, total_us;  // by options.clock; 0 without one
+  double asked_us[ENGRAM_CANDIDATE_COUNT];  // of query_us: what the memory's guesses of each kind took
 } engram_cycle;
 void engram_cycle_info(const engram_controller* handle, engram_cycle* cycle);
 

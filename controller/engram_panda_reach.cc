@@ -8,8 +8,7 @@
 
 namespace {
 using Task = engram::tasks::PandaReach;
-constexpr engram::MemoryTables kTables = {&panda_reach_knn_v1, &panda_reach_gpr_v1, &panda_reach_bow_v1, &panda_reach_time_v1,
-                                          &panda_reach_trust_v1, &panda_reach_gmr_v1};
+constexpr engram::MemoryTables kTables = PANDA_REACH_MEMORY;
 using Model = engram::ReachModel<Task, engram::ReachMemory<Task, kTables>>;
 }  // namespace
 

@@ -14,7 +14,7 @@ for description in models/*/*/task.toml; do
   scripts/setup.sh build
   grep -q '^kind = "reach"' "$description" || continue  # a motion has no memory to fit
   "$engram" data "$robot" "$task"
-  "$engram" fit "$robot" "$task" --contest 0
+  "$engram" fit "$robot" "$task"
   scripts/setup.sh build
 done
 if [ -z "$(git status --porcelain tables)" ]; then

@@ -2,8 +2,13 @@
 
 #include <chrono>
 #include <cmath>
+#include <type_traits>
 
 namespace engram::sim {
+
+namespace {
+constexpr int kKinds = std::extent_v<decltype(engram_msg_timing_t::asked)>;  // of guesses
+}
 
 Link::~Link() {
   if (lcm_) lcm_destroy(lcm_);
@@ -19,7 +24,11 @@ std::string Link::open(const char* url, uint64_t robot_digest, int nu, EventLog*
   lcm_subscribe(lcm_, kCommandChannel, on_command, this);
   lcm_subscribe(lcm_, kCycleChannel, on_cycle, this);
   lcm_subscribe(lcm_, kTimingChannel, on_timing, this);
-  if (timing_) std::fprintf(timing_, "utime,seq,query_us,candidates_us,linearize_us,backward_us,rollout_us,total_us\n");
+  if (timing_) {
+    std::fprintf(timing_, "utime,seq,query_us,candidates_us,linearize_us,backward_us,rollout_us,total_us");
+    for (int i = 0; i < kKinds; ++i) std::fprintf(timing_, ",asked%d_us", i);
+    std::fprintf(timing_, "\n");
+  }
   return "";
 }
 
@@ -118,8 +127,10 @@ void Link::on_timing(const lcm_recv_buf_t* buf, const char*, void* self) {
                        "ENGRAM_TIMING is truncated or of another type; build both sides from one checkout");
   }
   if (!link.timing_) return;
-  std::fprintf(link.timing_, "%lld,%lld,%.2f,%.2f,%.2f,%.2f,%.2f,%.2f\n", static_cast<long long>(t.utime),
+  std::fprintf(link.timing_, "%lld,%lld,%.2f,%.2f,%.2f,%.2f,%.2f,%.2f", static_cast<long long>(t.utime),
                static_cast<long long>(t.seq), t.query, t.candidates, t.linearize, t.backward, t.rollout, t.total);
+  for (float us : t.asked) std::fprintf(link.timing_, ",%.2f", us);
+  std::fprintf(link.timing_, "\n");
 }
 
 }  // namespace engram::sim

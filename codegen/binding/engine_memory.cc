@@ -8,6 +8,7 @@
 #include "tables/panda_reach/task.h"
 
 #include <algorithm>
+#include <deque>
 #include <optional>
 
 namespace engram::binding {
@@ -19,7 +20,7 @@ template <class Task> class Memory {
 
  public:
   Memory(const nb::object& knn, const nb::object& gpr, const nb::object& bow, const nb::object& time, const nb::object& trust,
-         const nb::object& mixture)
+         const nb::list& learners, const nb::object& train, int neighbours, int trains, bool regression, int lines)
       : knn_(knn, R::digest, Task::digest),
         gpr_(gpr, R::digest, Task::digest),
         bow_(bow, R::digest, Task::digest),
@@ -28,31 +29,34 @@ template <class Task> class Memory {
         tables_{knn_.as<TabKnn>(), gpr_.as<TabGpr>(), bow_.as<TabPca>(), time_.as<TabRbf>(), trust_.as<TabLogit>()},
         work_(std::make_unique<MemoryWork<Task>>()),
         answer_(std::make_unique<MemoryAnswer<Task>>()) {
-    if (!mixture.is_none()) tables_.mixture = mixture_.emplace(mixture, R::digest, Task::digest).template as<TabGmr>();
+    if (learners.size() > kMemoryLearners) throw nb::value_error("learners: too many");
+    for (nb::handle learner : learners) {
+      const HeldTable& held = learners_.emplace_back(nb::borrow<nb::object>(learner), R::digest, Task::digest);
+      tables_.learner[learners_.size() - 1] = held.head();
+    }
+    if (!train.is_none()) tables_.train = train_.emplace(train, R::digest, Task::digest).template as<TabTt>();
+    if (neighbours < 0 || neighbours > kMemoryNeighbours || trains < 0 || trains > kMemoryTrains || lines < 0 || lines > kMemoryLines)
+      throw nb::value_error("neighbours, trains or lines: out of range");
+    MemoryOpts& ensemble = tables_.ensemble;
+    ensemble.neighbours = neighbours;
+    ensemble.trains = trains;
+    ensemble.regression = regression;
+    ensemble.lines = lines;
     char text[TAB_TEXT];
     if (memory_check<Task>(tables_, text) != kTabOk) throw nb::value_error(text);
+    memory_init(tables_, *work_);
   }
 
-  nb::dict query(const In<1>& x0, const In<1>& task, int neighbours, int mixtures, bool regression, int lines, double max_warp,
-                 bool recall_controls) {
+  nb::dict query(const In<1>& x0, const In<1>& task) {
     check_shape<1>("x0", x0, {nx});
     check_shape<1>("task", task, {Task::ntask});
     ReachTarget target;
     if (!reach_target(task.data(), target)) throw nb::value_error("task: not finite, or its quaternion is zero");
-    if (neighbours < 0 || neighbours > kMemoryNeighbours || mixtures < 0 || mixtures > kMemoryMixtures || lines < 0 || lines > kMemoryLines)
-      throw nb::value_error("neighbours, mixtures or lines: out of range");
-    MemoryOpts opts;
-    opts.neighbours = neighbours;
-    opts.mixtures = mixtures;
-    opts.regression = regression;
-    opts.lines = lines;
-    opts.max_warp = max_warp;
-    opts.recall_controls = recall_controls;
     double t[N + 1];
     for (int k = 0; k <= N; ++k) t[k] = k * Task::dt;
     {
       nb::gil_scoped_release release;
-      memory_query<Task>(tables_, opts, target, x0.data(), N, t, *work_, *answer_);
+      memory_query<Task>(tables_, tables_.ensemble, target, x0.data(), N, t, *work_, *answer_);
     }
     const std::size_t m = answer_->n;
     NewArray xs({m, N + 1, nx}), us({m, N, nu}), inputs({m, kMemoryTrustInputs}), trust({m});
@@ -66,6 +70,8 @@ template <class Task> class Memory {
       kinds.append(guess.kind == GuessKind::kNeighbour    ? "neighbour"
                    : guess.kind == GuessKind::kRegression ? "regression"
                    : guess.kind == GuessKind::kMixture    ? "mixture"
+                   : guess.kind == GuessKind::kTrain      ? "train"
+                   : guess.kind == GuessKind::kNetwork    ? "network"
                                                           : "line");
       sources.append(guess.source);
     }
@@ -93,7 +99,7 @@ template <class Task> class Memory {
       if (!reach_target(tasks.data() + i * Task::ntask, goals[i])) throw nb::value_error("tasks: not finite, or a zero quaternion");
     const auto choice = std::make_unique<GoalChoice<Model, kMemoryGuesses>>();
     const auto ask = [&](const ReachTarget& goal, const double* t, Candidate<typename Model::P>* candidates) {
-      memory_query<Task>(tables_, MemoryOpts{}, goal, x0.data(), N, t, *work_, *answer_);
+      memory_query<Task>(tables_, tables_.ensemble, goal, x0.data(), N, t, *work_, *answer_);
       return reach_candidates(*answer_, candidates, 0);
     };
     NewArray merit({n});
@@ -104,7 +110,8 @@ template <class Task> class Memory {
  private:
   using Model = ReachModel<Task, void>;
   HeldTable knn_, gpr_, bow_, time_, trust_;
-  std::optional<HeldTable> mixture_;
+  std::deque<HeldTable> learners_;
+  std::optional<HeldTable> train_;
   MemoryTables tables_;
   std::unique_ptr<MemoryWork<Task>> work_;
   std::unique_ptr<MemoryAnswer<Task>> answer_;
@@ -114,10 +121,11 @@ template <class Task> void bind_task_memory(nb::module_& engine, const char* nam
   using namespace nb::literals;
   using M = Memory<Task>;
   nb::class_<M>(engine, name, "The memory of a task on tables of engram.emit.kinds.")
-      .def(nb::init<const nb::object&, const nb::object&, const nb::object&, const nb::object&, const nb::object&, const nb::object&>(),
-           "knn"_a, "gpr"_a, "bow"_a, "time"_a, "trust"_a, "mixture"_a = nb::none())
-      .def("query", &M::query, "x0"_a, "task"_a, "neighbours"_a = kMemoryNeighbours, "mixtures"_a = kMemoryMixtures, "regression"_a = true,
-           "lines"_a = kMemoryLines, "max_warp"_a = MemoryOpts{}.max_warp, "recall_controls"_a = MemoryOpts{}.recall_controls,
+      .def(nb::init<const nb::object&, const nb::object&, const nb::object&, const nb::object&, const nb::object&, const nb::list&,
+                    const nb::object&, int, int, bool, int>(),
+           "knn"_a, "gpr"_a, "bow"_a, "time"_a, "trust"_a, "learners"_a, "train"_a.none(), nb::kw_only(), "neighbours"_a, "trains"_a,
+           "regression"_a, "lines"_a)
+      .def("query", &M::query, "x0"_a, "task"_a,
            "Guesses xs (m, T + 1, nx), us (m, T, nu) with kind, source, trust and what the trust was made from (m, inputs).")
       .def("metric", &M::metric, "x0"_a, "tasks"_a,
            "Of several goals (n, ntask), the index of the one with the cheapest guess, and the merit of each one's best guess (n).");

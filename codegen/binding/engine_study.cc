@@ -25,7 +25,7 @@ std::unique_ptr<StudyCost> arm(const std::string& name, const std::vector<double
                                     : robot == "ur10" ? offline::ur10_cost(what)
                                                       : offline::planar_cost(robot, what, ends);
   if (!cost) {
-    throw nb::value_error(("no such cost: '" + name + "'; robots: panda, ur10, planar3, planar4; costs: ik, reach, pick, transfer").c_str());
+    throw nb::value_error(("no such cost: '" + name + "'; robots: panda, ur10, planar3, planar4; costs: ik, pose, reach, pick, transfer").c_str());
   }
   return cost;
 }
@@ -196,8 +196,8 @@ nb::list round(const nb::list& cores, int rank, double tolerance) {
 void bind_study(nb::module_& engine) {
   using namespace nb::literals;
   nb::class_<StudyCost>(engine, "StudyCost", "A cost over a box whose first `ntask` variables are the task.")
-      .def_ro("lo", &StudyCost::lo)
-      .def_ro("hi", &StudyCost::hi)
+      .def_rw("lo", &StudyCost::lo, "The box (d); it may be narrowed.")
+      .def_rw("hi", &StudyCost::hi)
       .def_ro("ntask", &StudyCost::ntask)
       .def_prop_ro("d", &StudyCost::d)
       .def_rw("scale", &StudyCost::scale, "Density: exp(-(scale C)^power), for costs that are not densities by nature.")

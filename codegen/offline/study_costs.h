@@ -17,7 +17,7 @@ struct Ends {
 };
 
 // Null if there is no cost of this name.
-std::unique_ptr<StudyCost> panda_cost(const std::string& what, const Ends& ends);   // among table, box, shelf: ik, reach, pick, transfer
+std::unique_ptr<StudyCost> panda_cost(const std::string& what, const Ends& ends);   // among table, box, shelf: ik, pose, reach, pick, transfer
 std::unique_ptr<StudyCost> ur10_cost(const std::string& what);                      // free space, tool upright: ik
 std::unique_ptr<StudyCost> planar_cost(const std::string& robot, const std::string& what, const Ends& ends);  // among discs: ik, reach, transfer
 

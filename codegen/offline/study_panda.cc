@@ -1,6 +1,7 @@
 // The Panda among table, box and shelf: costs of thesis tables 7.1 to 7.3.
 #include "codegen/offline/study_arm.h"
 #include "codegen/offline/study_costs.h"
+#include "codegen/offline/study_pose.h"
 #include "controller/ocp/ocp_obstacles.h"
 #include "tables/panda_reach/task.h"
 
@@ -33,11 +34,26 @@ template <class F> std::unique_ptr<StudyCost> bounded(int stops, int postures, i
   return cost;
 }
 
+// Any pose that the reach task knows.
+std::unique_ptr<StudyCost> pose() {
+  using Task = tasks::PandaReach;
+  constexpr double kPi = 3.14159265358979323846, kAngleLo[3] = {-0.5 * kPi, -0.5 * kPi, -0.5 * kPi}, kAngleHi[3] = {1.5 * kPi, 0.5 * kPi, 1.5 * kPi};
+  auto cost = std::make_unique<StudyCostOf<PoseCost<PandaSetup>, Pack>>(PoseCost<PandaSetup>{});
+  cost->ntask = kMemoryPose;
+  cost->lo.assign(Task::task_lo, Task::task_lo + 3);
+  cost->hi.assign(Task::task_hi, Task::task_hi + 3);
+  cost->lo.insert(cost->lo.end(), kAngleLo, kAngleLo + 3);
+  cost->hi.insert(cost->hi.end(), kAngleHi, kAngleHi + 3);
+  append_joints<PandaSetup::Robot>(1, 0, cost->lo, cost->hi);
+  return cost;
+}
+
 }  // namespace
 
 std::unique_ptr<StudyCost> panda_cost(const std::string& what, const Ends& ends) {
   if (what == "transfer") return transfer_cost<PandaSetup>(ends);
   if (what == "ik") return bounded<InverseKinematicsCost<PandaSetup>>(1, 1, 0);
+  if (what == "pose") return pose();
   if (what == "reach") return bounded<MotionCost<PandaSetup, 1, false>>(1, 1, 1);
   if (what == "pick") return bounded<MotionCost<PandaSetup, 2, true>>(2, 2, 3);
   return nullptr;

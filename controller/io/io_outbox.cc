@@ -52,6 +52,8 @@ bool Outbox::timing(const engram_cycle& c) {
   m.backward = c.backward_us;
   m.rollout = c.rollout_us;
   m.total = c.total_us;
+  static_assert(std::extent_v<decltype(m.asked)> == ENGRAM_CANDIDATE_COUNT, "as many kinds in timing_t as in engram.h");
+  for (int i = 0; i < ENGRAM_CANDIDATE_COUNT; ++i) m.asked[i] = static_cast<float>(c.asked_us[i]);
   return send(kTimingChannel, bytes_, encode(bytes_, sizeof bytes_, m));
 }
 

@@ -17,7 +17,6 @@ template <class M> class Guesses {
 
   int n = 0;
   Candidate<P> candidate[ENGRAM_GUESSES_MAX];
-  double query_us = 0.0, merit_us = 0.0;
 
   void clear() { n = nused_ = 0; }
   // The plan under way, shifted to the knot times `utime`; its first state is x0.
@@ -36,12 +35,11 @@ template <class M> class Guesses {
     stand_still(x0, own_);
     add(ENGRAM_CANDIDATE_COLD, own_);
   }
-  // What the memory proposes; the straight lines alone, unless `remember`. Another `elsewhere` than 0 makes one of them another line.
-  void ask_memory(const typename M::Target& target, bool remember, int64_t elsewhere, const double* x0,
-                  const int64_t (&utime)[N + 1]) {
+  // What the memory proposes.
+  void ask_memory(const typename M::Target& target, const Question& question, const double* x0, const int64_t (&utime)[N + 1]) {
     double t[N + 1];
     for (int k = 0; k <= N; ++k) t[k] = 1e-6 * static_cast<double>(utime[k] - utime[0]);
-    n = memory_.guesses(target, remember, elsewhere, x0, N, t, candidate, n);
+    n = memory_.guesses(target, question, x0, N, t, candidate, n);
   }
   void compare(const Horizon<P, N>& horizon) { loop_merit(horizon, candidate, n); }
 

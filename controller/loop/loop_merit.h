@@ -18,6 +18,14 @@ template <class P> struct Candidate {
   double merit, cost;
 };
 
+// What is asked of a memory beside the target.
+struct Question {
+  bool remember;      // false: the straight lines alone
+  int64_t elsewhere;  // not 0: one of the lines ends elsewhere, and the draws differ
+  engram_clock clock; // may be NULL
+  double* us;         // (ENGRAM_CANDIDATE_COUNT) out: what the guesses of each kind took, by the clock
+};
+
 // Fills merit and cost of n candidates on the horizon h. A trajectory that is not finite gets the merit +infinity.
 template <class P, int N> void loop_merit(const Horizon<P, N>& h, Candidate<P>* candidates, int n) {
   using L = typename P::Layout;

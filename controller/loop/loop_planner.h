@@ -65,7 +65,7 @@ template <class M> void Planner<M>::collect(bool postponed, bool stuck, const De
   if (guesses_.n == 0) guesses_.add_standing_still(x0);
   if (options_.memory == ENGRAM_MODE_MEMORY || options_.memory == ENGRAM_MODE_LINE) {
     const bool remember = options_.memory == ENGRAM_MODE_MEMORY && task_.known;
-    guesses_.ask_memory(task_.target, remember, stuck ? seq_ + 1 : 0, x0, solve_.plan.utime);
+    guesses_.ask_memory(task_.target, {remember, stuck ? seq_ + 1 : 0, options_.clock, cycle_.asked_us}, x0, solve_.plan.utime);
   }
   const double asked = deadline.now();
   guesses_.compare(solve_.horizon);

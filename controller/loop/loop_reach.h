@@ -63,7 +63,7 @@ template <class Task> struct NoReachMemory {
   static constexpr int kGuesses = 0;
   static bool tables_fit() { return true; }
   static uint64_t table_digest() { return 0; }
-  template <class P> int guesses(const ReachTarget&, bool, int64_t, const double*, int, const double*, Candidate<P>*, int n) { return n; }
+  template <class P> int guesses(const ReachTarget&, const Question&, const double*, int, const double*, Candidate<P>*, int n) { return n; }
 };
 
 }  // namespace engram

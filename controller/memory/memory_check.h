@@ -3,6 +3,7 @@
 #define CONTROLLER_MEMORY_MEMORY_CHECK_H_
 
 #include "controller/memory/memory_features.h"
+#include "controller/memory/memory_train.h"
 
 namespace engram {
 
@@ -17,14 +18,22 @@ template <class Task> TabStatus memory_check(const MemoryTables& tables, char* t
   for (const auto& table : expected) {
     if (tab_check(table.head, table.kind, R::digest, Task::digest, text) != kTabOk) return kTabBad;
   }
-  if (tables.mixture != nullptr && tab_check(&tables.mixture->head, kTabGmr, R::digest, Task::digest, text) != kTabOk) return kTabBad;
+  bool learners = true;
+  for (const TabHead* learner : tables.learner) {
+    if (learner == nullptr) continue;
+    const TabKind kind = learner->kind == kTabMlp ? kTabMlp : kTabGmr;
+    if (tab_check(learner, kind, R::digest, Task::digest, text) != kTabOk) return kTabBad;
+    learners = learners && learner->nin == kMemoryFeatures<Task> && learner->nout > R::nq && learner->nout <= R::nq + tables.bow->m;
+  }
+  if (tables.train != nullptr && tab_check(&tables.train->head, kTabTt, R::digest, Task::digest, text) != kTabOk) return kTabBad;
   const int m = tables.bow->m;
   const bool fit = tables.knn->d == kMemoryFeatures<Task> && tables.knn->m == R::nq + m &&  //
                    tables.gpr->d == kMemoryBowFeatures<Task> && tables.gpr->m == m && m <= kMemoryMaxBow &&
                    tables.time->nchannel == R::nq + R::nu && tables.bow->n == tables.time->k * (R::nq + R::nu) &&
                    tables.trust->d == kMemoryTrustInputs &&
-                   (tables.mixture == nullptr || (tables.mixture->d == kMemoryFeatures<Task> && tables.mixture->m > R::nq &&
-                                                  tables.mixture->m <= R::nq + m));
+                   learners &&
+                   (tables.train == nullptr || (tables.train->d == kMemoryPose + R::nq &&
+                                                tab_tt_sampler_bytes(tables.train, kMemoryTrainSamples) <= kMemoryTrainBytes));
   if (fit) return kTabOk;
   constexpr char kMisfit[] = "the memory's tables do not fit each other; run 'make tables' and build again";
   static_assert(sizeof kMisfit <= TAB_TEXT, "fits the caller's buffer");

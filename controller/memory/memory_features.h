@@ -34,8 +34,8 @@ template <class Task> void memory_bow_features(const double* start, const double
 inline constexpr int kMemoryMaxBow = TAB_MAX_IN;  // most coefficients of a bow
 
 // Inputs of the trust table: distance of the (nearest) sample, deviation of the regression (0 for others), warp [rad], is it a
-// regression, is it a line, is it of the mixture
-inline constexpr int kMemoryTrustInputs = 6;
+// regression, is it a line, is it of a mixture, of the train, of a network
+inline constexpr int kMemoryTrustInputs = 8;
 
 inline void memory_trust_inputs(double distance, double deviation, double warp, GuessKind kind, double* x) {
   x[0] = distance;
@@ -44,6 +44,8 @@ inline void memory_trust_inputs(double distance, double deviation, double warp, 
   x[3] = kind == GuessKind::kRegression;
   x[4] = kind == GuessKind::kLine;
   x[5] = kind == GuessKind::kMixture;
+  x[6] = kind == GuessKind::kTrain;
+  x[7] = kind == GuessKind::kNetwork;
 }
 
 }  // namespace engram

@@ -4,6 +4,7 @@
 
 #include "controller/ik/ik_pose.h"
 #include "controller/memory/memory_features.h"
+#include "controller/memory/memory_train.h"
 #include "controller/memory/memory_warp.h"
 #include "controller/tab/tab_random.h"
 
@@ -14,7 +15,7 @@ namespace engram {
 template <class Task> struct MemoryWork {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots, nq = R::nq;
-  static constexpr int kSlots = kMemoryNeighbours + kMemoryMixtures + (kLanes > 2 * kMemoryLines ? kLanes : 2 * kMemoryLines);
+  static constexpr int kSlots = kMemoryGuesses + kLanes;  // and what is tried beside
   // A guess in the making.
   struct Slot {
     GuessKind kind;
@@ -31,15 +32,23 @@ template <class Task> struct MemoryWork {
   double features[kMemoryFeatures<Task>], bow_features[kMemoryBowFeatures<Task>];
   int32_t index[kMemoryPool];
   float distance2[kMemoryPool];
-  alignas(64) float mode[kMemoryMixtures * (nq + kMemoryMaxBow + TAB_LANES)];  // of the mixture
-  float mode_bow[kMemoryMixtures][kMemoryMaxBow];                              // with zeros for the coefficients it lacks
-  alignas(64) float regression[kMemoryLines][kMemoryMaxBow + TAB_LANES];
+  alignas(64) float mode[kMemoryModes * (nq + kMemoryMaxBow + TAB_LANES)];  // answers of a learner
+  float mode_bow[kMemoryLearners][kMemoryModes][kMemoryMaxBow];
+  alignas(64) float regression[kMemoryTrains + kMemoryLines][kMemoryMaxBow + TAB_LANES];
+  double posture[kMemoryTrains][nq];  // of the train
   alignas(64) float weights[TAB_RBF_MAX_K * (nq + R::nu) + TAB_LANES];  // of a bow and its controls over time
   double basis[(N + 1) * TAB_RBF_MAX_K];
   double bow[N + 1][nq];
   Pack path[N + 1][nq];  // kLanes guesses side by side
   RbdData<R, Pack> rbd;
+  MemoryTrain<Task> train;
 };
+
+template <class Task> void memory_init(const MemoryTables& tables, MemoryWork<Task>& w) {
+  MemoryTrain<Task>& train = w.train;
+  train.ready = tables.train != nullptr &&
+                tab_tt_init(&train.sampler, tables.train, kMemoryTrainSamples, train.bytes, sizeof train.bytes) == kTabOk;
+}
 
 inline constexpr double kMemoryIkTolerance = 1e-3;  // [m, rad] an end farther from the goal counts as not reached
 inline constexpr int kMemoryWarpIterations = 10;     // of inverse kinematics from a remembered end, which is near
@@ -48,6 +57,30 @@ inline constexpr double kMemoryHuge = 1e6;          // no state, goal or time is
 
 // The steps of memory_query.
 namespace memory {
+
+// Adds what has passed since the last call to a kind's account.
+class Laps {
+ public:
+  Laps(double (*clock)(), double* us) : clock_(clock), us_(us), last_(now()) {}
+  void add(GuessKind kind) {
+    const double t = now();
+    us_[int(kind)] += t - last_;
+    last_ = t;
+  }
+  // The same shared out among all guesses.
+  template <class Task> void share(const MemoryAnswer<Task>& answer) {
+    const double each = answer.n > 0 ? (now() - last_) / answer.n : 0.0;
+    for (int i = 0; i < answer.n; ++i) us_[int(answer.guess[i].kind)] += each;
+  }
+
+ private:
+  double now() const { return clock_ != nullptr ? clock_() : 0.0; }
+  double (*clock_)();
+  double* us_;
+  double last_;
+};
+
+inline GuessKind kind_of(const TabHead& learner) { return learner.kind == kTabMlp ? GuessKind::kNetwork : GuessKind::kMixture; }
 
 inline bool usable(const double* x, int n) {
   for (int i = 0; i < n; ++i) {
@@ -125,31 +158,64 @@ int find_neighbours(const MemoryTables& tables, const MemoryOpts& opts, const Re
   return kept;
 }
 
-// The likeliest modes of the mixture whose end can be corrected -> further slots; returns how many slots there are.
+// The likeliest modes of one learner whose end can be corrected -> further slots; returns how many slots there are. bows: room for
+// those of its modes.
 template <class Task>
-int find_mixtures(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, int slots, MemoryWork<Task>& w,
-                  MemoryAnswer<Task>& answer) {
+int find_modes(const MemoryTables& tables, const TabHead& learner, const MemoryOpts& opts, const ReachTarget& goal, int slots,
+               float (*bows)[kMemoryMaxBow], MemoryWork<Task>& w, MemoryAnswer<Task>& answer) {
   constexpr int nq = Task::Robot::nq;
-  if (tables.mixture == nullptr || opts.mixtures == 0) return slots;
-  int32_t component[kMemoryMixtures];
-  float probability[kMemoryMixtures];
-  const TabStatus status = tab_gmr_modes(tables.mixture, w.features, opts.mixtures, component, probability, w.mode, nullptr);
+  if (opts.modes == 0) return slots;
+  int32_t index[kMemoryModes];
+  float probability[kMemoryModes];
+  const TabStatus status = tab_answers(&learner, w.features, opts.modes, index, probability, w.mode, nullptr);
   answer.status = tab_worse(answer.status, status);
-  const int leading = tables.mixture->m - nq;
+  const int leading = learner.nout - nq;
   int last = slots;
-  for (int i = 0; i < opts.mixtures && component[i] >= 0; ++i) {
-    const float* const y = w.mode + i * tab_pad(tables.mixture->m);
-    for (int j = 0; j < tables.bow->m; ++j) w.mode_bow[i][j] = j < leading ? y[nq + j] : 0.0f;
-    auto& slot = add(w, last, GuessKind::kMixture, component[i], w.mode_bow[i], answer.distance);
+  for (int i = 0; i < opts.modes && index[i] >= 0; ++i) {
+    const float* const y = w.mode + i * tab_pad(learner.nout);
+    for (int j = 0; j < tables.bow->m; ++j) bows[i][j] = j < leading ? y[nq + j] : 0.0f;  // zeros for the coefficients it lacks
+    auto& slot = add(w, last, kind_of(learner), index[i], bows[i], answer.distance);
     for (int j = 0; j < nq; ++j) slot.start[j] = y[j];
   }
   find_ends(goal, kMemoryWarpIterations, slots, last, w);
   return keep_corrected(opts, slots, last, last, w, answer);
 }
 
+// The bow that the process predicts for the end of a slot -> bow (pad(m)), deviation
+template <class Task>
+void regress(const MemoryTables& tables, const ReachTarget& goal, const double* x0, typename MemoryWork<Task>::Slot& slot, float* bow,
+             MemoryWork<Task>& w, MemoryAnswer<Task>& answer) {
+  memory_bow_features<Task>(x0, slot.end, goal, w.bow_features);
+  float variance;
+  tab_gpr_query(tables.gpr, w.bow_features, bow, &variance);
+  slot.bow = bow;
+  slot.deviation = std::sqrt(variance / (tables.gpr->variance + tables.gpr->noise));
+  answer.deviation = std::fmin(answer.deviation, slot.deviation);
+}
+
+// Postures of the train that can be corrected for the goal -> further slots; returns how many slots there are.
+template <class Task>
+int find_trains(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, int slots,
+                MemoryWork<Task>& w, MemoryAnswer<Task>& answer) {
+  constexpr int nq = Task::Robot::nq;
+  if (!w.train.ready || opts.trains == 0) return slots;
+  TabStatus status;
+  const int n = likely_postures<Task>(goal, uint64_t(opts.elsewhere + 1), opts.trains, w.train, status, w.posture);
+  answer.status = tab_worse(answer.status, status);
+  int last = slots;
+  for (int i = 0; i < n; ++i) {
+    auto& slot = add(w, last, GuessKind::kTrain, i, nullptr, answer.distance);
+    for (int j = 0; j < nq; ++j) slot.start[j] = w.posture[i][j];
+  }
+  find_ends(goal, kMemoryWarpIterations, slots, last, w);
+  last = keep_corrected(opts, slots, last, last, w, answer);
+  for (int i = slots; i < last; ++i) regress(tables, goal, x0, w.slot[i], w.regression[i - slots], w, answer);
+  return last;
+}
+
 // Lines and their regressions -> further slots; returns how many slots there are.
 template <class Task>
-int find_lines(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, int slots,
+int find_lines(const MemoryTables& tables, const MemoryOpts& opts, const ReachTarget& goal, const double* x0, int slots, Laps& laps,
                MemoryWork<Task>& w, MemoryAnswer<Task>& answer) {
   using R = typename Task::Robot;
   const int first = slots;
@@ -163,17 +229,13 @@ int find_lines(const MemoryTables& tables, const MemoryOpts& opts, const ReachTa
   }
   const int last = slots;
   find_ends(goal, IkOptions{}.iterations, first, last, w);
+  laps.add(GuessKind::kLine);
   for (int i = first; i < last && opts.regression; ++i) {
     if (!w.slot[i].reached) continue;
     auto& slot = w.slot[slots++];
     slot = w.slot[i];
     slot.kind = GuessKind::kRegression;
-    slot.bow = w.regression[i - first];
-    memory_bow_features<Task>(x0, slot.end, goal, w.bow_features);
-    float variance;
-    tab_gpr_query(tables.gpr, w.bow_features, w.regression[i - first], &variance);
-    slot.deviation = std::sqrt(variance / (tables.gpr->variance + tables.gpr->noise));
-    answer.deviation = std::fmin(answer.deviation, slot.deviation);
+    regress(tables, goal, x0, slot, w.regression[kMemoryTrains + i - first], w, answer);
   }
   return slots;
 }
@@ -229,14 +291,24 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
   answer.status = kTabOk;
   answer.distance = INFINITY;
   answer.deviation = 1;
+  for (double& us : answer.us) us = 0;
   if (!memory::usable(x0, nq + nv) || !memory::usable(t, n + 1) || !memory::usable(goal.p, 3) || !memory::usable(goal.R, 9)) {
     answer.status = kTabNotFinite;
     return;
   }
+  memory::Laps laps(opts.clock, answer.us);
   memory_features<Task>(x0, goal, w.features);
   const int neighbours = memory::find_neighbours(tables, opts, goal, w, answer);
-  const int remembered = memory::find_mixtures(tables, opts, goal, neighbours, w, answer);
-  answer.n = memory::find_lines(tables, opts, goal, x0, remembered, w, answer);
+  laps.add(GuessKind::kNeighbour);
+  int remembered = neighbours;
+  for (int i = 0; i < kMemoryLearners && tables.learner[i] != nullptr; ++i) {
+    remembered = memory::find_modes(tables, *tables.learner[i], opts, goal, remembered, w.mode_bow[i], w, answer);
+    laps.add(memory::kind_of(*tables.learner[i]));
+  }
+  const int sampled = memory::find_trains(tables, opts, goal, x0, remembered, w, answer);
+  laps.add(GuessKind::kTrain);
+  answer.n = memory::find_lines(tables, opts, goal, x0, sampled, laps, w, answer);
+  laps.add(GuessKind::kRegression);
   for (int i = 0; i < answer.n; ++i) memory::judge<Task>(tables, w.slot[i], answer.guess[i]);
   tab_rbf_basis(tables.time, n + 1, t, w.basis, nullptr);
   const double T = tab_hi(&tables.time->head)[0];
@@ -259,6 +331,7 @@ void memory_query(const MemoryTables& tables, const MemoryOpts& opts, const Reac
       }
     });
   }
+  laps.share(answer);
 }
 
 }  // namespace engram

@@ -148,13 +148,15 @@ def write_summary(folder: Path, summary: dict[str, Any]) -> None:
 
 
 def print_summary(summary: dict[str, Any]) -> None:
-    """The table of the report on the terminal."""
-    rows = report.table(summary)
-    widths = [max(len(row[c]) for row in rows) for c in range(len(rows[0]))]
+    """The tables of the report on the terminal."""
     print(f"\n{summary['robot']} {summary['task']}, {summary['jumps']} jumps, seed {summary['seed']}, {summary['wall_s']:.0f} s")
-    for row in rows:
-        print("  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))]))
-    print()
+    for rows in (report.table(summary), report.guess_table(summary)):
+        if len(rows) == 1:
+            continue
+        widths = [max(len(row[c]) for row in rows) for c in range(len(rows[0]))]
+        for row in rows:
+            print("  ".join([row[0].ljust(widths[0]), *(cell.rjust(width) for cell, width in zip(row[1:], widths[1:]))]))
+        print()
 
 
 def read_summary(folder: Path) -> dict[str, Any]:

@@ -90,6 +90,25 @@ def table(summary: dict[str, Any]) -> list[list[str]]:
     return [[row[c] for c in kept] for row in rows]
 
 
+GUESSES_TEXT = (
+    "Guesses of the mode memory, by who proposes them: the share of jumps at which one of them had the lowest merit and seeded "
+    "the solver, and the CPU time of a cycle that it takes to ask for them, decoding included."
+)
+
+
+def guess_table(summary: dict[str, Any]) -> list[list[str]]:
+    """Heading and one row per kind of guess in the mode memory; the heading alone if there is nothing to tell."""
+    row = summary["modes"].get("memory", {})
+    won, asked = row.get("won", {}), row.get("asked_us", {})
+    rows = [["guesses", "won", "asked p50", "p99"]]
+    for kind in sorted(won.keys() | asked.keys(), key=lambda kind: (-won.get(kind, 0.0), kind)):
+        us = asked.get(kind, {})
+        rows.append(
+            [kind, number(won.get(kind, 0.0), ".1f", 100, " %"), *(number(us.get(p), ".0f", 1, " us") for p in ("p50", "p99"))]
+        )
+    return rows
+
+
 def html_table(rows: list[list[str]], swatches: bool = False) -> str:
     """A table; with `swatches` the first column carries the mode's colour and the first row is set off."""
     head = "".join(f"<th>{html.escape(cell)}</th>" for cell in rows[0])
@@ -187,6 +206,8 @@ def write(
         f"{mode} {1e3 * row['move_error_mean_m']:.1f} mm" for mode, row in summary["modes"].items() if "move_error_mean_m" in row
     ]
     moving = f"<p>While the target moves, the hand is on average this far from it: {', '.join(moves)}.</p>" if moves else ""
+    kinds = guess_table(summary)
+    guesses = f"<h2>Who proposes</h2>{html_table(kinds)}<p>{GUESSES_TEXT}</p>" if len(kinds) > 1 else ""
     page = f"""<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
 <title>Engram: {robot} {task}</title><style>{CSS}</style></head><body><main>
@@ -198,6 +219,7 @@ def write(
 {html_table(table(summary), swatches=True)}
 <p>{MODES_TEXT}</p>
 {moving}{failures(runs)}
+{guesses}
 <h2>Figures</h2><div class="grid">{figures}</div>
 <h2>Fall-back ladder</h2><p>Share of cycles, but those that answer a jump, by what drove the torque.</p>{ladder(motions)}
 <h2>Again</h2>

@@ -77,6 +77,15 @@ class Run:
         kinds = [line.split(",")[2] for line in lines if line.count(",") > 2 and not line.startswith("0,")]
         return {kind: kinds.count(kind) / len(kinds) for kind in sorted(set(kinds))}
 
+    def asked(self) -> dict[str, dict[str, float]]:
+        """CPU time [us] of asking the memory for guesses of each kind, decoding included, over the cycles that asked for it."""
+        times = {}
+        for i, kind in enumerate(enumerators("engram_candidate")):
+            us = self.timing.get(f"asked{i}_us", np.array([]))
+            if np.any(us > 0.0):
+                times[kind] = percentiles(us[us > 0.0]) | {"cycles": int(np.sum(us > 0.0))}
+        return times
+
     def summary(self) -> dict[str, Any]:
         """The mode's row of the table: shares, times (s, us), errors."""
         jumps = self.finished()
@@ -95,6 +104,8 @@ class Run:
                 row[f"subopt{k}"] = float(np.median(values))
         if won := self.won():
             row["won"] = won
+        if asked := self.asked():
+            row["asked_us"] = asked
         total = self.timing.get("total_us", np.array([]))
         if len(total):
             row["cycle_us"] = percentiles(total)
@@ -155,6 +166,9 @@ def figures(robot: str, runs: list[Run], seed: int = SEED) -> list[dict[str, Any
     row = rows.get("memory", {})
     for kind, share in row.get("won", {}).items():
         add(f"won.{kind}", share, "1", row["jumps"])
+    for kind, us in row.get("asked_us", {}).items():
+        for share in ("p50", "p99"):
+            add(f"asked_us.{kind}.{share}", us[share], "us", us["cycles"])
     cycles = next((len(run.timing.get("total_us", [])) for run in runs if run.mode == "memory"), 0)
     for kind in ("p50", "p99", "max"):
         add(f"cycle_us.{kind}", row.get("cycle_us", {}).get(kind), "us", cycles)

@@ -24,7 +24,7 @@ struct NonsenseMemory {
   static bool tables_fit() { return true; }
   static uint64_t table_digest() { return 1; }
   template <class P>
-  int guesses(const ReachTarget&, bool, int64_t, const double* x0, int, const double*, Candidate<P>* candidates, int n) {
+  int guesses(const ReachTarget&, const Question&, const double* x0, int, const double*, Candidate<P>* candidates, int n) {
     constexpr double kBad[kGuesses] = {std::numeric_limits<double>::quiet_NaN(), std::numeric_limits<double>::infinity(), 1e300,
                                        -1e155};
     for (int g = 0; g < kGuesses; ++g) {

@@ -21,8 +21,7 @@ using Task = tasks::PandaReach;
 using R = Task::Robot;
 using P = Reach<Task>;
 constexpr int N = Task::nknots, nq = R::nq, nv = R::nv;
-constexpr MemoryTables kTables{&panda_reach_knn_v1, &panda_reach_gpr_v1, &panda_reach_bow_v1, &panda_reach_time_v1,
-                               &panda_reach_trust_v1, &panda_reach_gmr_v1};
+constexpr MemoryTables kTables = PANDA_REACH_MEMORY;
 
 struct Query {
   std::mt19937 random;
@@ -33,6 +32,8 @@ struct Query {
   std::unique_ptr<MemoryAnswer<Task>> answer = std::make_unique<MemoryAnswer<Task>>();
 
   explicit Query(unsigned seed) : random(seed) {
+    memory_init(kTables, *work);
+    opts = kTables.ensemble;
     for (int k = 0; k <= N; ++k) t[k] = k * Task::dt;
     for (int i = 0; i < nq; ++i) x0[i] = uniform(R::q_lo[i] + 0.1, R::q_hi[i] - 0.1);
     double q[nq];
@@ -90,7 +91,7 @@ TEST(MemoryCheck, AMissingForeignOrMisfittingTableIsNamed) {
 }
 
 TEST(MemoryQuery, EveryGuessIsAMotionFromTheStateToTheGoal) {
-  int of_kind[4] = {};
+  int of_kind[6] = {};
   for (unsigned seed = 0; seed < 30; ++seed) {
     Query query(seed);
     for (int i = 0; i < nv; ++i) query.x0[nq + i] = query.uniform(-0.5, 0.5);
@@ -102,7 +103,7 @@ TEST(MemoryQuery, EveryGuessIsAMotionFromTheStateToTheGoal) {
       EXPECT_EQ(std::memcmp(guess.x[0], query.x0, sizeof query.x0), 0);
       EXPECT_GE(guess.trust, 0);
       EXPECT_LE(guess.trust, 1);
-      if (guess.kind == GuessKind::kNeighbour || guess.kind == GuessKind::kMixture) {
+      if (guess.kind != GuessKind::kLine && guess.kind != GuessKind::kRegression) {
         EXPECT_LE(guess.warp, query.opts.max_warp);
       }
       // trust 0 marks the only guesses that may miss
@@ -120,7 +121,8 @@ TEST(MemoryQuery, EveryGuessIsAMotionFromTheStateToTheGoal) {
     }
   }
   EXPECT_GT(of_kind[int(GuessKind::kNeighbour)], 60);  // two per query, far from the data as these random states are
-  EXPECT_GT(of_kind[int(GuessKind::kMixture)], 30);
+  EXPECT_GT(of_kind[int(GuessKind::kMixture)] + of_kind[int(GuessKind::kNetwork)], 30);
+  EXPECT_GT(of_kind[int(GuessKind::kTrain)], 10);
   EXPECT_GT(of_kind[int(GuessKind::kRegression)], 60);
   EXPECT_EQ(of_kind[int(GuessKind::kLine)], 30 * kMemoryLines);
 }
@@ -137,14 +139,14 @@ TEST(MemoryQuery, OrderAndOptions) {
   EXPECT_GT(all.deviation, 0);
   EXPECT_LT(all.deviation, 1);
   for (int g = 1; g < all.n; ++g) {
-    constexpr int kRank[] = {0, 3, 2, 1};  // neighbours, mixtures, lines, regressions
+    constexpr int kRank[] = {0, 4, 3, 1, 2, 1};  // neighbours, modes, trains, lines, regressions
     const auto rank = [&](GuessKind kind) { return kRank[int(kind)]; };
     EXPECT_LE(rank(all.guess[g - 1].kind), rank(all.guess[g].kind));
   }
   query.opts.regression = false;
   query.ask();
   EXPECT_EQ(count(GuessKind::kRegression), 0);
-  query.opts.neighbours = query.opts.mixtures = 0;
+  query.opts.neighbours = query.opts.modes = query.opts.trains = 0;
   const MemoryAnswer<Task>& lines = query.ask();
   EXPECT_EQ(lines.n, kMemoryLines - 1);  // no best neighbour to go to
   EXPECT_EQ(count(GuessKind::kLine), lines.n);
@@ -152,24 +154,25 @@ TEST(MemoryQuery, OrderAndOptions) {
   EXPECT_EQ(lines.deviation, 1);
   query.opts.lines = 0;
   EXPECT_EQ(query.ask().n, 0);
-  query.opts = MemoryOpts{};
+  query.opts = kTables.ensemble;
   query.opts.neighbours = 1;
   query.ask();
   EXPECT_LE(count(GuessKind::kNeighbour), 1);
 }
 
-TEST(MemoryQuery, WithoutAMixtureTheOtherGuessesAreTheSame) {
+TEST(MemoryQuery, WithoutLearnersAndTrainTheOtherGuessesAreTheSame) {
   Query query(4);
   query.ask();
   MemoryTables tables = kTables;
-  tables.mixture = nullptr;
+  for (const TabHead*& learner : tables.learner) learner = nullptr;
+  tables.train = nullptr;
   const auto work = std::make_unique<MemoryWork<Task>>();
   const auto answer = std::make_unique<MemoryAnswer<Task>>();
   memory_query<Task>(tables, query.opts, query.goal, query.x0, N, query.t, *work, *answer);
   int same = 0, modes = 0;
   for (int g = 0; g < query.answer->n; ++g) {
     const Guess<Task>& guess = query.answer->guess[g];
-    if (guess.kind == GuessKind::kMixture) {
+    if (guess.kind == GuessKind::kMixture || guess.kind == GuessKind::kNetwork || guess.kind == GuessKind::kTrain) {
       ++modes;
       EXPECT_GE(guess.source, 0);
       continue;
@@ -179,6 +182,56 @@ TEST(MemoryQuery, WithoutAMixtureTheOtherGuessesAreTheSame) {
   }
   EXPECT_EQ(same, answer->n);
   EXPECT_GT(modes, 0);
+}
+
+TEST(MemoryPose, SixNumbersGiveTheSamePose) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    Query query(seed);
+    double x[kMemoryPose];
+    memory_pose(query.goal, x);
+    const Mat3<double> R_WT = memory_pose_rotation(x + 3);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(x[i], query.goal.p[i]);
+    for (int i = 0; i < 9; ++i) EXPECT_NEAR(R_WT(i / 3, i % 3), query.goal.R[i], 1e-14);  // rounding of a few sines
+  }
+  // forward, down, and a roll by pi lie well inside of the angles' ranges
+  const double forward[9] = {0, 0, 1, 0, 1, 0, -1, 0, 0}, down[9] = {1, 0, 0, 0, -1, 0, 0, 0, -1};
+  ReachTarget goal{};
+  double x[kMemoryPose];
+  std::memcpy(goal.R, forward, sizeof forward);
+  memory_pose(goal, x);
+  EXPECT_NEAR(x[3], M_PI / 2, 1e-15);
+  EXPECT_NEAR(x[5], 0, 1e-15);
+  std::memcpy(goal.R, down, sizeof down);
+  memory_pose(goal, x);
+  EXPECT_NEAR(x[3], M_PI, 1e-15);
+  EXPECT_NEAR(std::fabs(x[5] - M_PI), 0, 1e-15);
+}
+
+TEST(MemoryTrain, PosturesDifferAndTheCheapestComesFirst) {
+  int found = 0;
+  for (unsigned seed = 0; seed < 20; ++seed) {
+    Query query(seed);
+    MemoryTrain<Task>& train = query.work->train;
+    double posture[kMemoryTrains][nq], again[kMemoryTrains][nq];
+    TabStatus status;
+    const int n = memory::likely_postures<Task>(query.goal, 1, kMemoryTrains, train, status, posture);
+    ASSERT_LE(n, kMemoryTrains);
+    double last = 0;
+    for (int i = 0; i < n; ++i) {
+      const double cost = memory::posture_cost<Task>(query.goal, posture[i]);
+      EXPECT_GE(cost, last);
+      last = cost;
+      for (int j = 0; j < i; ++j) {
+        double apart = 0;
+        for (int k = 0; k < nq; ++k) apart = std::fmax(apart, std::fabs(posture[i][k] - posture[j][k]));
+        EXPECT_GT(apart, kMemoryTrainApart);
+      }
+    }
+    ASSERT_EQ(memory::likely_postures<Task>(query.goal, 1, kMemoryTrains, train, status, again), n);
+    EXPECT_EQ(std::memcmp(posture, again, sizeof *posture * n), 0);
+    found += n;
+  }
+  EXPECT_GT(found, 40);
 }
 
 TEST(MemoryQuery, ARememberedTaskIsRecalled) {
@@ -308,6 +361,7 @@ TEST(MemoryQuery, TwoThousandQueriesStayFiniteAndBounded) {
 TEST(MemoryQuery, TheSameQuestionGetsTheSameAnswer) {
   Query a(8), b(8);
   std::memset(static_cast<void*>(b.work.get()), 0x5a, sizeof *b.work);  // whatever the scratch held before
+  memory_init(kTables, *b.work);
   a.ask();
   b.ask();
   ASSERT_EQ(a.answer->n, b.answer->n);

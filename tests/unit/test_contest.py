@@ -7,7 +7,8 @@ import pytest
 
 from engram.emit import Knn
 from engram.learn.contenders import Contender, from_table, smaller, table_bytes
-from engram.learn.contest import Outcomes, choose, judge, modes_of, suboptimality, together
+from engram.learn.contest import Outcomes, asked, choose, judge, modes_of, suboptimality, together
+from engram.learn.memory import Ensemble
 
 
 def outcomes(merit: list[float], good: list[bool], after: list[float]) -> Outcomes:
@@ -54,6 +55,22 @@ def test_bytes_limit_the_choice_and_a_shared_table_counts_once() -> None:
         choose(team, found, LOWEST, table_bytes(table) - 1)
 
 
+def test_the_base_is_always_in_and_the_controller_has_room_for_two_learners() -> None:
+    team = [contender("line"), *(from_table(name, knn(50), 2, 3) for name in ("x", "y", "z"))]
+    found = {
+        "line": outcomes([5] * 4, [False, True, True, True], [1.0] * 4),
+        "x": outcomes([1, 9, 9, 9], [True, False, False, False], [1.0] * 4),
+        "y": outcomes([9, 1, 9, 9], [False, True, False, False], [1.0] * 4),
+        "z": outcomes([9, 9, 1, 9], [False, False, True, False], [1.0] * 4),
+    }
+    names, chosen = choose(team, found, LOWEST, 10**6)
+    assert names == ("line", "x") and chosen.good.all()
+    ensemble = asked([*team[:3], from_table("many", knn(50), 2, 3, 8, ensemble=Ensemble(neighbours=8))])
+    assert [table.role for table in ensemble.learners] == ["x", "y"] and ensemble.neighbours == 8 and not ensemble.regression
+    with pytest.raises(ValueError, match="no contender fits"):
+        choose([contender("c", control=True)], {"c": C}, LOWEST, 10**6)
+
+
 def test_the_control_at_the_same_bytes_is_no_larger() -> None:
     table = knn(400)
     for size in (2000, 6000, table_bytes(table)):
@@ -80,6 +97,6 @@ def test_the_verdict_judges_on_tasks_it_has_not_chosen_by() -> None:
     }
     verdict = judge([contender("a"), contender("b")], found, LOWEST, 0)
     figures = {name: value for name, value, *_ in verdict.figures}
-    assert verdict.ensemble == ("a",) and figures["success.a"] == 0.5
+    assert verdict.names == ("a",) and verdict.ensemble == Ensemble() and figures["success.a"] == 0.5
     assert figures["success.ensemble"] == 0.0 and figures["success_any.ensemble"] == 0.0
     assert any(line.startswith("ensemble: a; chosen on 2 tasks, judged on 2 others") for line in verdict.lines)

@@ -21,7 +21,7 @@ from engram.learn.gpr import fit_gpr, fit_hyperparameters, round_digits
 from engram.learn.memory import Memory, Motions, Settings, features, fit_memory, rms
 from engram.learn.reproducible import PINNED, pinned
 from engram.learn.timebase import TimeBasis
-from engram.learn.trust import Trials, fit_trust, probability
+from engram.learn.trust import INPUTS, Trials, fit_trust, probability
 
 T = 1.5
 TIMES = np.linspace(0, T, 51)
@@ -188,8 +188,8 @@ def test_trust_is_calibrated() -> None:
 
 
 def test_trust_of_guesses_that_all_succeed() -> None:
-    table, report = fit_trust(Trials(np.arange(50), np.zeros((50, 6)), np.ones(50, bool)))
-    assert probability(table.weight, table.bias, np.zeros((1, 6)))[0] == pytest.approx(0.99) and report == [
+    table, report = fit_trust(Trials(np.arange(50), np.zeros((50, len(INPUTS))), np.ones(50, bool)))
+    assert probability(table.weight, table.bias, np.zeros((1, len(INPUTS))))[0] == pytest.approx(0.99) and report == [
         ("trust.good", 1.0, "1")
     ]
 

@@ -29,7 +29,7 @@ def test_wilson_interval_at_the_ends() -> None:
 def test_enumerators_follow_the_header() -> None:
     assert enumerators("engram_status")[:3] == ["converged", "iterating", "deadline"]
     assert enumerators("engram_rung") == ["plan", "shifted", "hold", "damping", "off"]
-    assert enumerators("engram_candidate") == ["shifted", "knn", "gpr", "gmr", "line", "cold"]
+    assert enumerators("engram_candidate") == ["shifted", "knn", "gpr", "gmr", "line", "cold", "tt", "mlp"]
     assert enumerators("engram_nonsense") == []
 
 

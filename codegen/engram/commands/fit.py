@@ -1,6 +1,7 @@
 """Fit the memory of a robot and task to its solved motions and write the tables the controller links."""
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from engram.paths import BUILD, TABLES, relative
@@ -9,11 +10,12 @@ EXAMPLES = """examples:
   engram data panda reach     first: the solved motions, build/data/panda_reach.npz
   engram fit panda reach      tables/panda_reach/*.c, *.S, *.bin, tables.h, MANIFEST.json
   engram fit panda reach --out /tmp/tables && engram table diff panda_reach /tmp/tables/panda_reach
-  engram fit panda reach --contest 0       the tables alone
+  engram fit panda reach --contest 0       no contest: neighbours, mixture, train and regression, as good as they may be
 The same data give the same bytes: the process restarts itself with pinned instruction sets and one thread.
 
-The contest trains every learner (k-NN, regression, mixtures, networks) and solves held-out tasks from the best of its guesses,
-beside controls: standing still, straight lines, random postures, nearest neighbours in as many bytes as the learner takes.
+The contest trains every learner (k-NN, regression, train, mixtures, networks) and solves held-out tasks from the best of its
+guesses, beside controls: standing still, straight lines, random postures, nearest neighbours in as many bytes as the learner takes.
+Which learners the controller asks, beside neighbours, regression and lines, is what succeeds most often together.
   success    arrives clear of obstacles within 50 iterations      subopt1, subopt3   median excess cost after 1 and 3 iterations
   modes      distinct postures among its answers                  query us           one query of its table, median
 """
@@ -35,7 +37,10 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         "--trials", type=int, default=TRIALS, help=f"held-out tasks on which guesses are tried (default: {TRIALS})"
     )
     parser.add_argument(
-        "--contest", type=int, default=CONTEST, help=f"held-out tasks on which all learners compete (default: {CONTEST}; 0: none)"
+        "--contest",
+        type=int,
+        default=CONTEST,
+        help=f"held-out tasks on which all learners compete (default: {CONTEST}; 0: no contest)",
     )
     return parser
 
@@ -48,9 +53,13 @@ def run(args: argparse.Namespace) -> int:
     from engram.emit import write_tables
     from engram.engine import engine
     from engram.inputs import InputError
+    from engram.learn.contenders import Settings as LearnerSettings
+    from engram.learn.contest import hold_contest
     from engram.learn.dataset import load_motions
     from engram.learn.figures import write_figures
-    from engram.learn.memory import Settings, fit_memory
+    from engram.learn.memory import Ensemble, Settings, deployed, fit_memory
+    from engram.learn.train import Settings as TrainSettings
+    from engram.learn.train import fit_train
     from engram.learn.trials import decoding_loss, metric_regret, try_guesses
     from engram.learn.trust import fit_trust
     from engram.tasks.spec import load_task
@@ -62,17 +71,33 @@ def run(args: argparse.Namespace) -> int:
     source = load_motions(args.data or BUILD / "data" / f"{name}.npz", spec, HELD_OUT)
     motions = source.motions
     print(f"fit:    {len(motions.x)} motions, {int(motions.held_out.sum())} of them held out")
-    memory = fit_memory(motions, getattr(engine, args.robot), Settings(), lambda text: print(f"fit:    {text}", flush=True))
-    print("fit:    trust: trying guesses on held-out tasks", flush=True)
+
+    def progress(text: str) -> None:
+        print(f"fit:    {text}", flush=True)
+
+    memory = fit_memory(motions, getattr(engine, args.robot), Settings(), progress)
+    memory = replace(memory, train=fit_train(args.robot, motions, TrainSettings(), progress))
+    names = ()
+    if args.contest > 0:
+        verdict = hold_contest(spec, memory, source, args.contest, LIMIT, LearnerSettings(), progress)
+        print("\n".join(f"fit:    {line}" for line in verdict.lines))
+        write_figures("contest", [(f"contest.{key}", *figure) for key, *figure in verdict.figures])
+        names, memory = verdict.names, replace(memory, ensemble=verdict.ensemble)
+    else:
+        memory = replace(memory, ensemble=Ensemble(8, (memory.mixture,), 4, True))
+    progress("trust: trying guesses on held-out tasks")
     trust, trust_report = fit_trust(try_guesses(spec, memory, source, args.trials))
+    tables, macro = deployed(name, memory, trust)
     manifest = write_tables(
         args.out / name,
         name,
-        [memory.knn, memory.gpr, memory.bow, memory.time, trust, memory.mixture],
+        tables,
         robot_digest=spec.robot.digest,
         task_digest=spec.digest,
         data_digest=source.digest,
-        provenance=f"engram fit {args.robot} {args.task}; {source.made_from}; {len(motions.x)} motions",
+        provenance=f"engram fit {args.robot} {args.task}; {source.made_from}; {len(motions.x)} motions"
+        + (f"; ensemble {', '.join(names)}" if names else ""),
+        macros={f"{name.upper()}_MEMORY": macro},
     )
     size = sum(file["bytes"] for file in manifest["files"].values())
     report = [*memory.report, *decoding_loss(spec, memory, source), *trust_report, ("bytes", float(size), "byte")]
@@ -82,15 +107,6 @@ def run(args: argparse.Namespace) -> int:
         print(f"fit:    {key:<28} {value:.4g} {unit}")
     write_figures("fit", [(f"fit.{name}.{key}", value, unit, n) for key, value, unit, n in counted])
     print(f"fit:    {relative(args.out / name)}: {len(manifest['files'])} files")
-    if args.contest > 0:
-        from engram.learn.contenders import Settings as LearnerSettings
-        from engram.learn.contest import hold_contest
-
-        verdict = hold_contest(
-            spec, memory, source, args.contest, LIMIT, LearnerSettings(), lambda text: print(f"contest: {text}", flush=True)
-        )
-        print("\n".join(f"contest: {line}" for line in verdict.lines))
-        write_figures("contest", [(f"contest.{key}", *figure) for key, *figure in verdict.figures])
     if size > LIMIT:
         raise InputError(f"the tables take {size} bytes, the limit is {LIMIT}: fit fewer motions or coefficients")
     return 0

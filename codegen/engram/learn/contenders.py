@@ -7,15 +7,16 @@ it can: that map has many modes. Controls: nothing at all, straight lines, rando
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from engram.emit import Knn, Mlp, Table
 from engram.engine import engine
-from engram.learn.memory import Memory, Motions, bow_features
+from engram.learn.memory import Ensemble, Memory, Motions, bow_features
 from engram.learn.mixture import condition, fit_gaussian, mixture_table
 from engram.learn.network import Network, fit_density, fit_ensemble
+from engram.learn.train import POSTURES, SAMPLES, likely, poses
 
 ANSWERS = 8  # asked of every learner, as many as the memory has neighbours
 SMALLER = ("bgmr", "mdn")  # learners that compete with int8 storage as well: what it costs is measured
@@ -54,6 +55,7 @@ class Contender:
     near: bool  # its postures are answers: inverse kinematics may only correct them, not wander off
     tables: tuple[Table, ...] = ()
     control: bool = False  # there to be beaten, not to be chosen
+    ensemble: Ensemble = field(default_factory=Ensemble)  # what the controller must ask for to have its guesses
 
     @property
     def bytes(self) -> int:
@@ -69,8 +71,9 @@ class Contender:
         return float(np.median(engine.Table(table).time_us(x, ANSWERS)))
 
 
-def from_table(name: str, table: Table, nq: int, components: int, answers: int = ANSWERS, control: bool = False) -> Contender:
-    """A learner that is a table from features to (end, leading coefficients)."""
+def from_table(name: str, table: Table, nq: int, components: int, answers: int = ANSWERS, control: bool = False,
+               ensemble: Ensemble | None = None) -> Contender:  # fmt: skip
+    """A learner that is a table from features to (end, leading coefficients). ensemble: by default with this table."""
     evaluator = engine.Table(table)
 
     def propose(x: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, Bows]:
@@ -80,7 +83,9 @@ def from_table(name: str, table: Table, nq: int, components: int, answers: int =
         z[:, : y.shape[1] - nq] = y[:, nq:]
         return np.ascontiguousarray(y[:, :nq]), lambda ends, kept: z[kept]
 
-    return Contender(name, propose, True, (table,), control)
+    return Contender(
+        name, propose, True, (table,), control, ensemble or Ensemble(learners=(replace(table, role=name.replace(".", "_")),))
+    )
 
 
 def smaller(knn: Knn, size: int) -> Knn:
@@ -130,21 +135,37 @@ def learners(
 def remembered(memory: Memory, nq: int) -> list[Contender]:
     """The nearest neighbours of the memory, one and many."""
     m = memory.code.components
-    return [from_table(f"knn{k}", memory.knn, nq, m, k) for k in (1, ANSWERS)]
+    return [from_table(f"knn{k}", memory.knn, nq, m, k, ensemble=Ensemble(neighbours=k)) for k in (1, ANSWERS)]
 
 
 def regression(memory: Memory, q_home: np.ndarray) -> Contender:
     """The process between given ends: postures as the lines', bows predicted once inverse kinematics has found the ends."""
-    nq = len(q_home)
 
     def propose(x: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, Bows]:
-        def bows(ends: np.ndarray, kept: np.ndarray) -> np.ndarray:
-            n = len(ends)
-            return memory.regression.predict(bow_features(np.tile(start, (n, 1)), ends, np.tile(x[nq : nq + 3], (n, 1))))[0]
+        return np.array([q_home, start]), predicted_bows(memory, x, start)
 
-        return np.array([q_home, start]), bows
+    return Contender("gpr", propose, False, (memory.gpr,), ensemble=Ensemble(regression=True))
 
-    return Contender("gpr", propose, False, (memory.gpr,))
+
+def sampled(robot: str, memory: Memory, nq: int) -> Contender:
+    """The tensor train: postures by sampling, the bow to each by the process."""
+    cost, train = engine.study_arm(f"{robot}.pose"), engine.TensorTrain(memory.train, SAMPLES)
+
+    def propose(x: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, Bows]:
+        return likely(cost, train, poses(x[None], nq)[0])[0], predicted_bows(memory, x, start)
+
+    return Contender("tt", propose, True, (memory.train,), ensemble=Ensemble(trains=POSTURES))
+
+
+def predicted_bows(memory: Memory, x: np.ndarray, start: np.ndarray) -> Bows:
+    """The process between given ends."""
+    nq = len(start)
+
+    def bows(ends: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        n = len(ends)
+        return memory.regression.predict(bow_features(np.tile(start, (n, 1)), ends, np.tile(x[nq : nq + 3], (n, 1))))[0]
+
+    return bows
 
 
 def controls(q_lo: np.ndarray, q_hi: np.ndarray, q_home: np.ndarray, seed: int) -> list[Contender]:

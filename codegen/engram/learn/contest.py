@@ -8,22 +8,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields, replace
+from functools import reduce
 from itertools import combinations
+from operator import or_
 
 import numpy as np
 from tqdm import tqdm
 
 from engram.data.reach import NEARLY, ReachSolver
 from engram.data.reach import Settings as SolverSettings
-from engram.learn.contenders import Contender, controls, learners, regression, remembered, table_bytes
+from engram.learn.contenders import Contender, controls, learners, regression, remembered, sampled, table_bytes
 from engram.learn.contenders import Settings as LearnerSettings
 from engram.learn.dataset import Source
-from engram.learn.memory import Memory
+from engram.learn.memory import Ensemble, Memory
 from engram.tasks.spec import TaskSpec
 
 ITERATIONS = 50  # after which a motion must arrive, clear of obstacles, whether it has converged or not
 AFTER = (1, 3)  # iterations after which the suboptimality is taken
 REACHED = 1e-3  # m, rad: as kMemoryIkTolerance of controller/memory/memory_query.h
+BASE = ("knn8", "gpr", "line")  # always in the ensemble: any memory of motions has them
+LEARNERS = 2  # kMemoryLearners of controller/memory/memory.h
 OTHER_END = 0.3  # rad, postures further apart in a joint are different modes: kOtherEnd of controller/loop/loop_guesses.h
 
 
@@ -128,16 +132,27 @@ def suboptimality(outcomes: Outcomes, lowest: np.ndarray) -> np.ndarray:
     return np.median(outcomes.after / lowest[:, None] - 1, axis=0)
 
 
-def choose(
-    contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np.ndarray, limit: int, members: int = 4
-) -> tuple[tuple[str, ...], Outcomes]:
-    """The ensemble of at most `members` contenders, none of them a control, and `limit` bytes that succeeds most often.
+def asked(team: Iterable[Contender]) -> Ensemble:
+    """What the controller must ask for to have the guesses of all of them."""
+    return reduce(or_, (contender.ensemble for contender in team), Ensemble())
 
-    Among equals the least suboptimal after one iteration, to two digits; then the one of fewest bytes; then the first by name.
+
+def choose(
+    contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np.ndarray, limit: int, members: int = 3
+) -> tuple[tuple[str, ...], Outcomes]:
+    """BASE and at most `members` other contenders, none of them a control, within `limit` bytes: who succeed most often together.
+
+    The controller must have room for them: at most LEARNERS tables of mixtures and networks. Among equals the least suboptimal
+    after one iteration, to two digits; then the one of fewest bytes; then the first by name.
     """
+    base = [contender for contender in contenders if contender.name in BASE]
+    others = sorted((c for c in contenders if not c.control and c.name not in BASE), key=lambda c: c.name)
     best = None
-    for n in range(1, members + 1):
-        for team in combinations(sorted((c for c in contenders if not c.control), key=lambda c: c.name), n):
+    for n in range(members + 1):
+        for more in combinations(others, n):
+            team = [*base, *more]
+            if not team or len(asked(team).learners) > LEARNERS:
+                continue
             tables = {id(table): table for contender in team for table in contender.tables}
             size = sum(table_bytes(table) for table in tables.values())
             if size > limit:
@@ -158,7 +173,8 @@ class Verdict:
 
     lines: list[str]
     figures: list[tuple[str, float, str, int]]
-    ensemble: tuple[str, ...]
+    names: tuple[str, ...]
+    ensemble: Ensemble
 
 
 def judge(contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np.ndarray, limit: int) -> Verdict:
@@ -186,7 +202,7 @@ def judge(contenders: list[Contender], outcomes: dict[str, Outcomes], lowest: np
     lines.append(f"ensemble: {', '.join(names)}; chosen on {len(choosing)} tasks, judged on {len(judging)} others")
     lines.append(f"solved from each member's guess, the first that succeeds: {100 * any_good.mean():.1f} %")
     figures.append(("success_any.ensemble", float(any_good.mean()), "1", len(judging)))
-    return Verdict(lines, figures, names)
+    return Verdict(lines, figures, names, asked(team))
 
 
 def hold_contest(
@@ -199,6 +215,7 @@ def hold_contest(
         *controls(robot.q_lo, robot.q_hi, robot.q_home, settings.seed),
         *remembered(memory, robot.nq),
         regression(memory, robot.q_home),
+        *([sampled(robot.name, memory, robot.nq)] if memory.train else []),
         *learners(source.motions, memory, settings, progress),
     ]
     progress(f"{len(contenders)} contenders on {tasks} held-out tasks")

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from engram.emit import Gmr, Gpr, Knn, Pca, Rbf
+from engram.emit import Gmr, Gpr, Knn, Pca, Rbf, Table, Tt
 from engram.learn.bow import BowCode, Dynamics, fit_bow_code, straight
 from engram.learn.gpr import FittedGpr, fit_gpr, fit_hyperparameters
 from engram.learn.mixture import condition, fit_bayesian, mixture_table
 from engram.learn.timebase import TimeBasis
 
-MODES = 4  # of the mixture that the controller asks for: kMemoryMixtures of controller/memory/memory.h
+MODES = 4  # of a learner that the controller asks for: kMemoryModes of controller/memory/memory.h
 
 
 @dataclass(frozen=True)
@@ -52,8 +52,26 @@ class Motions:
 
 
 @dataclass(frozen=True)
+class Ensemble:
+    """What the controller asks for (MemoryOpts of controller/memory/memory.h). learners: tables whose answers are modes."""
+
+    neighbours: int = 0
+    learners: tuple[Table, ...] = ()
+    trains: int = 0
+    regression: bool = False
+    lines: int = 3
+
+    def __or__(self, other: Ensemble) -> Ensemble:
+        """Both."""
+        return Ensemble(
+            max(self.neighbours, other.neighbours), self.learners + other.learners, max(self.trains, other.trains),
+            self.regression or other.regression,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
 class Memory:
-    """A fitted memory without its trust; `report`: held-out errors, one (name, value, unit) per line."""
+    """A fitted memory without its trust; report: held-out errors, one (name, value, unit) per line; train: of learn/train.py."""
 
     code: BowCode
     regression: FittedGpr
@@ -63,6 +81,24 @@ class Memory:
     time: Rbf
     mixture: Gmr
     report: list[tuple[str, float, str]]
+    train: Tt | None = None
+    ensemble: Ensemble = field(default_factory=lambda: Ensemble())
+
+
+def deployed(name: str, memory: Memory, trust: Table) -> tuple[list[Table], str]:
+    """The tables to write for robot_task `name`, and the initializer of their MemoryTables (controller/memory/memory.h)."""
+    ask = memory.ensemble
+    train = [memory.train] if ask.trains else []
+    first = [memory.knn, memory.gpr, memory.bow, memory.time, trust]
+    tables = [*first, *ask.learners, *train]
+
+    def address(table: Table) -> str:
+        return f"&{name}_{table.role}_v{table.schema}"
+
+    learners = ", ".join(f"{address(table)}.head" for table in ask.learners)
+    counts = f"{ask.neighbours}, {MODES}, {ask.trains}, {ask.lines}, {str(ask.regression).lower()}"
+    ends = address(memory.train) if train else "nullptr"
+    return tables, f"{{{', '.join(map(address, first))}, {{{learners}}}, {ends}, {{{counts}}}}}"
 
 
 def features(q: np.ndarray, p_WT: np.ndarray, R_WT: np.ndarray) -> np.ndarray:

@@ -73,7 +73,11 @@ def metric_regret(spec: TaskSpec, memory: Memory, source: Source, choices: int) 
 def memory_of(spec: TaskSpec, memory: Memory):
     """The deployed query on fitted tables, whose trust knows nothing yet."""
     kind = getattr(engine, f"{camel(f'{spec.robot.name}_{spec.name}')}Memory")
-    return kind(memory.knn, memory.gpr, memory.bow, memory.time, constant_trust(0.5), memory.mixture)
+    ask = memory.ensemble
+    return kind(
+        memory.knn, memory.gpr, memory.bow, memory.time, constant_trust(0.5), list(ask.learners), memory.train,
+        neighbours=ask.neighbours, trains=ask.trains, regression=ask.regression, lines=ask.lines,
+    )  # fmt: skip
 
 
 def decoding_loss(spec: TaskSpec, memory: Memory, source: Source) -> list[tuple[str, float, str]]:

@@ -12,12 +12,15 @@ from engram.emit import Logit
 from engram.learn.gpr import round_digits
 
 # of memory_features.h
-INPUTS = [("distance", "1"), ("deviation", "1"), ("warp", "rad"), ("regression", "1"), ("line", "1"), ("mixture", "1")]
+INPUTS = [
+    ("distance", "1"), ("deviation", "1"), ("warp", "rad"), ("regression", "1"), ("line", "1"), ("mixture", "1"), ("train", "1"),
+    ("network", "1"),
+]  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Trials:
-    """Guesses that were tried. task (n,), inputs (n, 6) as memory_trust_inputs makes them, good (n,) bool."""
+    """Guesses that were tried. task (n,), inputs (n, 8) as memory_trust_inputs makes them, good (n,) bool."""
 
     task: np.ndarray
     inputs: np.ndarray
