@@ -13,7 +13,7 @@ namespace engram {
 inline constexpr int kMemoryTrainSamples = 64;
 inline constexpr double kMemoryTrainPriority = 0.8;  // alpha of algorithm 6
 inline constexpr double kMemoryTrainApart = 0.3;     // [rad] postures that differ less in every joint are one
-inline constexpr int64_t kMemoryTrainBytes = 192 * 1024;  // room for the sampler
+inline constexpr int64_t kMemoryTrainBytes = 96 * 1024;  // room for the sampler
 
 // A sampler and all its memory. Not copied: the sampler points into it.
 template <class Task> struct MemoryTrain {

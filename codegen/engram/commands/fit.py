@@ -14,7 +14,7 @@ EXAMPLES = """examples:
 The same data give the same bytes: the process restarts itself with pinned instruction sets and one thread.
 
 The contest trains every learner (k-NN, regression, train, mixtures, networks) and solves held-out tasks from the best of its
-guesses, beside controls: standing still, straight lines, random postures, nearest neighbours in as many bytes as the learner takes.
+guesses, beside controls: standing still, straight lines, random postures, nearest neighbours in as many bytes as it takes.
 Which learners the controller asks, beside neighbours, regression and lines, is what succeeds most often together.
   success    arrives clear of obstacles within 50 iterations      subopt1, subopt3   median excess cost after 1 and 3 iterations
   modes      distinct postures among its answers                  query us           one query of its table, median
