@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct TalosStand {
   using Robot = robots::Talos;
   static constexpr char name[] = "talos_stand";
-  static constexpr uint64_t digest = 0x155acfdc6bf32e0e;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x5dd0d2399569c300;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 3;
@@ -33,9 +33,9 @@ struct TalosStand {
   static constexpr double dt = 0x1.47ae147ae147bp-5;  // 0.04 s
 
   // <table>_<key> of task.toml
-  static constexpr double weights_orientation = 0x1.388p+12;  // 5000
+  static constexpr double weights_orientation = 0x1.f4p+8;  // 500
   static constexpr double weights_posture[2] = {0x1p+0, 0x1.4p+3};  // 1, 10
-  static constexpr double weights_base_velocity = 0x1.ep+4;  // 30
+  static constexpr double weights_base_velocity = 0x1.4p+3;  // 10
   static constexpr double weights_velocity[2] = {0x1.4p+2, 0x1.4p+3};  // 5, 10
   static constexpr double weights_com[3] = {0x1.f4p+9, 0x1.f4p+9, 0x1.86ap+16};  // 1000, 1000, 100000
   static constexpr double weights_torque = 0x1.0624dd2f1a9fcp-10;  // 0.001
@@ -45,7 +45,7 @@ struct TalosStand {
   static constexpr double weights_terminal = 0x1p+0;  // 1
   static constexpr double weights_terminal_velocity = 0x1p+0;  // 1
   static constexpr double sole_half[2] = {0x1.70a3d70a3d70ap-4, 0x1.999999999999ap-5};  // 0.09, 0.05
-  static constexpr double sole_friction = 0x1.3333333333333p-1;  // 0.6
+  static constexpr double sole_friction = 0x1.999999999999ap-2;  // 0.4
   static constexpr double gait_swing_weight = 0.0;  // 0
   static constexpr double gait_landing = 0.0;  // 0
   static constexpr double gait_capture = 0.0;  // 0

@@ -69,7 +69,7 @@ TEST_F(StandTest, SquatsAsAsked) {
 TEST_F(StandTest, TakesPushesWhicheverWayItLooks) {
   struct {
     double heading, x, y;
-  } const pushes[] = {{0.5 * M_PI, 20.0, 0.0}, {M_PI, 0.0, 28.0}};
+  } const pushes[] = {{0.5 * M_PI, 20.0, 0.0}, {M_PI, 0.0, 28.0}, {0.3, 0.0, -28.0}};
   for (const auto& push : pushes) {
     LeggedPlant plant(kModel, push.heading);
     LeggedController c(kModel);
@@ -78,9 +78,23 @@ TEST_F(StandTest, TakesPushesWhicheverWayItLooks) {
     run(plant, c, 1000, [](double) {});
     const double x = plant.com[0], y = plant.com[1], cs = std::cos(push.heading), sn = std::sin(push.heading);
     plant.push("torso_2_joint", {(cs * push.x - sn * push.y) / 0.1, (sn * push.x + cs * push.y) / 0.1, 0.0});
-    run(plant, c, 1100, [](double) {});
+    struct Sole {
+      const double* p;  // position in the world [m]
+      double x, y;      // where it was
+    };
+    std::vector<Sole> soles;
+    for (const char* name : {"left_sole", "right_sole"}) {
+      const double* const p = plant.data()->geom_xpos + 3 * mj_name2id(plant.model(), mjOBJ_GEOM, name);
+      soles.push_back({p, p[0], p[1]});
+    }
+    double slip = 0.0;
+    const auto watch = [&](double) {
+      for (const Sole& s : soles) slip = std::max(slip, std::hypot(s.p[0] - s.x, s.p[1] - s.y));
+    };
+    run(plant, c, 1100, watch);
     plant.push("torso_2_joint", {0.0, 0.0, 0.0});
-    run(plant, c, 4000, [](double) {});
+    run(plant, c, 4000, watch);
+    EXPECT_LT(slip, 0.02) << "a step, heading " << push.heading;  // m, issue 3
     EXPECT_LT(std::hypot(plant.com[0] - x, plant.com[1] - y), 0.02) << "heading " << push.heading;  // back above the feet
   }
 }
