@@ -79,6 +79,12 @@ setup_python() {
     pip_install --only-binary :all: -r requirements.txt -r requirements-peers.txt
     echo "$stamp" > .venv/stamp
   fi
+  stamp=$(content_hash requirements-cluster.txt)
+  if [ "$(cat .venv/cluster.stamp 2> /dev/null)" != "$stamp" ]; then
+    say python "installing the optional extra: clusters"
+    pip_install --only-binary :all: -r requirements-cluster.txt
+    echo "$stamp" > .venv/cluster.stamp
+  fi
   stamp=$(content_hash pyproject.toml)
   if [ "$(cat .venv/engram.stamp 2> /dev/null)" != "$stamp" ]; then
     say python "installing the package engram (editable)"

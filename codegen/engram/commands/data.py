@@ -14,6 +14,8 @@ CHUNK = 20  # tasks in a file: what a stop may lose, per worker
 EXAMPLES = """examples:
   engram data panda reach                  as many tasks as models/panda/reach/task.toml asks for
   engram data panda reach --n 200 --seed 7 another, smaller set
+  engram data talos step                   steps of Talos: planned, then refined; --n of each foot
+  engram data talos step --cluster tcp://10.0.0.1:8786      on the workers of a Dask cluster; the same files
 A run that was stopped goes on where it was; another seed, task, solver setting or build starts anew.
 """
 
@@ -23,9 +25,10 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser = subparsers.add_parser("data", help=__doc__, description=__doc__, epilog=EXAMPLES)
     parser.add_argument("robot", help="folder of models/ that holds a robot.toml")
     parser.add_argument("task", help="folder of models/<robot>/ that holds a task.toml and a world.xml")
-    parser.add_argument("--n", type=int, help="tasks to draw (default: memory.samples of task.toml)")
-    parser.add_argument("--seed", type=int, help="of the tasks (default: memory.seed of task.toml)")
+    parser.add_argument("--n", type=int, help="tasks to draw (default: memory.samples of task.toml; steps: 6000 of each foot)")
+    parser.add_argument("--seed", type=int, help="of the tasks (default: memory.seed of task.toml; steps: 1)")
     parser.add_argument("--workers", type=int, default=os.cpu_count(), help="processes (default: one per core)")
+    parser.add_argument("--cluster", metavar="tcp://HOST:PORT", help="scheduler of a Dask cluster that does the work instead")
     parser.add_argument("--out", type=Path, default=BUILD / "data", help="where to write (default: build/data/)")
     return parser
 
@@ -35,25 +38,30 @@ def run(args: argparse.Namespace) -> int:
     from engram.learn.reproducible import restart_pinned
 
     restart_pinned()
+    from engram.data import step_set
     from engram.inputs import InputError
     from engram.tasks.spec import load_task
 
-    spec = load_task(args.robot, args.task)
-    n = spec.memory["samples"] if args.n is None else args.n
-    seed = spec.memory["seed"] if args.seed is None else args.seed
+    steps = (args.robot, args.task) == ("talos", "step")
+    spec = None if steps else load_task(args.robot, args.task)
+    n = (step_set.SAMPLES if steps else spec.memory["samples"]) if args.n is None else args.n
+    seed = (step_set.SEED if steps else spec.memory["seed"]) if args.seed is None else args.seed
     if n < 1 or seed < 0 or args.workers < 1:
         raise InputError("--n and --workers must be at least 1, --seed at least 0")
     started = time.monotonic()
-    summary = solve_all(spec, n, seed, args.workers, args.out)
+    if steps:
+        summary = step_set.make(n, seed, args.workers, args.out, args.cluster)
+    else:
+        summary = solve_all(spec, n, seed, args.workers, args.out, args.cluster)
     name = f"{args.robot}_{args.task}"
     seconds = time.monotonic() - started
-    print(f"data:   {relative(args.out)}/{name}.npz  {summary['solved']} of {n} tasks solved in {seconds:.0f} s")
+    print(f"data:   {relative(args.out)}/{name}.npz  {summary['solved']} of {summary['tasks']} tasks solved in {seconds:.0f} s")
     for reason, count in summary["failed"].items():
         print(f"data:   {count} left out: {reason}")
     return 0
 
 
-def solve_all(spec, n: int, seed: int, workers: int, out: Path) -> dict:
+def solve_all(spec, n: int, seed: int, workers: int, out: Path, cluster: str | None = None) -> dict:
     """Both passes over n tasks; writes the two files and returns the summary."""
     import numpy as np
 
@@ -67,10 +75,10 @@ def solve_all(spec, n: int, seed: int, workers: int, out: Path) -> dict:
     # what another build of the solver has left is not mixed with this one's
     key = f"{made_from} engine {hashlib.sha256(Path(engine.__file__).read_bytes()).hexdigest()[:16]}"
     lines = chunks.Chunks(out / f"{name}_lines", key, n, CHUNK)
-    first = chunks.run(lines, reach.make_lines, arguments, workers, "data:   lines")
+    first = chunks.run(lines, reach.make_lines, arguments, workers, "data:   lines", cluster)
     # the neighbours of a task are among all n: another n is another second pass
     neighbours = chunks.Chunks(out / f"{name}_neighbours", f"{key} n {n}", n, CHUNK)
-    arrays = chunks.run(neighbours, reach.make_neighbours, (*arguments, first), workers, "data:   neighbours")
+    arrays = chunks.run(neighbours, reach.make_neighbours, (*arguments, first), workers, "data:   neighbours", cluster)
 
     good = arrays["outcome"] == reach.OK
     kept = {key: arrays[key][good] for key in ("X", "xs", "us", "cost", "seeds", "iterations", "arrived")}

@@ -79,23 +79,36 @@ def _run_chunk(chunks: Chunks, items: range) -> range:
 
 
 def run(
-    chunks: Chunks, make_work: Callable[..., Callable[[range], Arrays]], arguments: tuple, workers: int, title: str
+    chunks: Chunks,
+    make_work: Callable[..., Callable[[range], Arrays]],
+    arguments: tuple,
+    workers: int,
+    title: str,
+    cluster: str | None = None,
 ) -> Arrays:
     """Fill the missing chunks with `make_work(*arguments)(items)` in `workers` processes; returns all chunks, joined.
 
-    Raises InputError if a worker dies; what is finished is kept, and another run goes on from there.
+    `cluster`: address of a Dask scheduler, whose workers are used instead; the files are the same. Raises InputError if a worker
+    dies (of a cluster: if it fails); what is finished is kept, and another run goes on from there.
     """
     chunks.folder.mkdir(parents=True, exist_ok=True)
     missing = [items for items in chunks.ranges() if chunks.read(items) is None]
     done = chunks.n - sum(map(len, missing))
     with tqdm(total=chunks.n, initial=done, desc=title, unit="", smoothing=0.05, mininterval=0.5) as bar:
-        for items in _completed(chunks, missing, make_work, arguments, min(workers, len(missing))):
+        for items in _completed(chunks, missing, make_work, arguments, min(workers, len(missing)), cluster):
             bar.update(len(items))
     return chunks.joined()
 
 
-def _completed(chunks: Chunks, missing: list[range], make_work, arguments: tuple, workers: int) -> Iterator[range]:
+def _completed(
+    chunks: Chunks, missing: list[range], make_work, arguments: tuple, workers: int, cluster: str | None
+) -> Iterator[range]:
     if not missing:
+        return
+    if cluster is not None:
+        from engram.data.cluster import completed
+
+        yield from completed(chunks, missing, make_work, arguments, cluster)
         return
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, context, _start_worker, (make_work, arguments)) as pool:

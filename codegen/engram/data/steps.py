@@ -6,6 +6,7 @@ pendulum, swing foot by a curve, inverse kinematics, inverse dynamics. Stage two
 on (seed, foot, i) alone.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -37,14 +38,14 @@ class Settings:
 
 def place(frame: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Poses `at` (..., 3) given in the axes of `frame` (3), as (x, y, yaw) where the frame is."""
-    c, s = np.cos(frame[2]), np.sin(frame[2])
+    c, s = math.cos(frame[2]), math.sin(frame[2])  # numpy's own depend on the processor
     x, y, yaw = at[..., 0], at[..., 1], at[..., 2]
     return np.stack([frame[0] + c * x - s * y, frame[1] + s * x + c * y, frame[2] + yaw], axis=-1)
 
 
 def seen_from(frame: np.ndarray, at: np.ndarray) -> np.ndarray:
     """The inverse of `place`: poses `at` (..., 3) in the axes of `frame` (3)."""
-    c, s = np.cos(frame[2]), np.sin(frame[2])
+    c, s = math.cos(frame[2]), math.sin(frame[2])  # numpy's own depend on the processor
     x, y = at[..., 0] - frame[0], at[..., 1] - frame[1]
     return np.stack([c * x + s * y, -s * x + c * y, at[..., 2] - frame[2]], axis=-1)
 
