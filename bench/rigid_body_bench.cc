@@ -4,7 +4,7 @@
 #include "bench/counting.h"
 #include "bench/stopwatch.h"
 #include "controller/rbd/rbd_aba.h"
-#include "controller/rbd/rbd_derivatives.h"
+#include "controller/rbd/rbd_derivatives_rows.h"
 #include "tables/panda/robot.h"
 #include "tables/talos/robot.h"
 
@@ -31,14 +31,15 @@ template <class R> std::vector<Sample<R>> split(const std::vector<double>& numbe
   return samples;
 }
 
-// Results of all algorithms at one state (one state a lane when S = Pack).
-template <class R, class S> struct RigidBody {
-  S q[R::nq], v[R::nv], a[R::nv], tau[R::nv];
-  RbdData<R, S> d;
-  S out[R::nv];
-  Mat<S, R::nv, R::nv> A, B, C;
+// A matrix of derivatives: padded rows for one state, plain ones for states in lanes.
+template <class R, class S> struct DerivativeMatrix { using type = Mat<S, R::nv, R::nv>; };
+template <class R> struct DerivativeMatrix<R, double> { using type = RowMatrix<R>; };
 
-  void load(const std::vector<Sample<R>>& samples, std::size_t first) {
+// A state (one state a lane when S = Pack).
+template <class R, class S> struct State {
+  S q[R::nq], v[R::nv], a[R::nv], tau[R::nv];
+
+  State(const std::vector<Sample<R>>& samples, std::size_t first) {
     for (int l = 0; l < lanes_of<S>; ++l) {
       const Sample<R>& s = samples[std::min(first + l, samples.size() - 1)];
       for (int i = 0; i < R::nq; ++i) set_lane(q[i], l, s.q[i]);
@@ -49,47 +50,59 @@ template <class R, class S> struct RigidBody {
       }
     }
   }
-  void fk() { rbd_kinematics(q, d); }
-  void rnea() { rbd_rnea(q, v, a, d, out); }
-  void aba() { rbd_aba(q, v, tau, d, out); }
-  void crba() {  // the triangle of M that dynamics uses; Pinocchio's crba leaves one, too
-    rbd_kinematics(q, d);
-    rbd_crba_branches(d, d.L);
+};
+
+// All algorithms and their results: one work space for all states, like the peer's Data.
+template <class R, class S> struct RigidBody {
+  using Input = State<R, S>;
+  RbdData<R, S> d;
+  S out[R::nv];
+  typename DerivativeMatrix<R, S>::type A, B, C;
+
+  void fk(const Input& s) { rbd_kinematics(s.q, d); }
+  void rnea(const Input& s) { rbd_rnea(s.q, s.v, s.a, d, out); }
+  void aba(const Input& s) { rbd_aba(s.q, s.v, s.tau, d, out); }
+  void crba(const Input& s) {  // into the upper triangle of a matrix, as Pinocchio's
+    rbd_kinematics(s.q, d);
+    rbd_crba_upper(d, A);
   }
-  void rnea_derivatives() {
-    rbd_rnea(q, v, a, d, out);
+  void rnea_derivatives(const Input& s) {
+    rbd_rnea(s.q, s.v, s.a, d, out);
     rbd_composite_inertias(d);
     rbd_rnea_derivatives(d, A, B);
   }
-  void aba_derivatives() {
-    rbd_forward_dynamics(q, v, tau, d, out);
+  void aba_derivatives(const Input& s) {
+    rbd_forward_dynamics(s.q, s.v, s.tau, d, out);
     rbd_forward_derivatives(d, out, A, B, C);
   }
 };
 
+template <class R, class M> void append_matrix(std::vector<double>& to, const M& m, bool upper_of_symmetric = false) {
+  for (int i = 0; i < R::nv; ++i)
+    for (int j = 0; j < R::nv; ++j) to.push_back(upper_of_symmetric && j < i ? m(j, i) : m(i, j));
+}
+
 template <class R> void compare(const std::vector<double>& numbers) {
   const auto samples = split<R>(numbers);
-  constexpr int nv = R::nv;
-  RigidBody<R, double> body;
+  static RigidBody<R, double> body;
   std::vector<double> p_WJ, tau, acc, M, tau_q, tau_v, acc_q, acc_v;
-  const auto append = [](std::vector<double>& to, const double* from, int n) { to.insert(to.end(), from, from + n); };
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    body.load(samples, i);
-    body.fk();
-    for (const auto& p : body.d.p_WJ) append(p_WJ, p.data(), 3);
-    body.rnea();
-    append(tau, body.out, nv);
-    body.aba();
-    append(acc, body.out, nv);
-    body.fk();
-    rbd_crba(body.d, body.A);
-    append(M, body.A.data(), nv * nv);
-    body.rnea_derivatives();
-    append(tau_q, body.A.data(), nv * nv);
-    append(tau_v, body.B.data(), nv * nv);
-    body.aba_derivatives();
-    append(acc_q, body.A.data(), nv * nv);
-    append(acc_v, body.B.data(), nv * nv);
+    const State<R, double> s(samples, i);
+    body.fk(s);
+    for (const auto& p : body.d.p_WJ) p_WJ.insert(p_WJ.end(), p.data(), p.data() + 3);
+    body.rnea(s);
+    tau.insert(tau.end(), body.out, body.out + R::nv);
+    body.aba(s);
+    acc.insert(acc.end(), body.out, body.out + R::nv);
+    body.A.set_zero();
+    body.crba(s);
+    append_matrix<R>(M, body.A, true);
+    body.rnea_derivatives(s);
+    append_matrix<R>(tau_q, body.A);
+    append_matrix<R>(tau_v, body.B);
+    body.aba_derivatives(s);
+    append_matrix<R>(acc_q, body.A);
+    append_matrix<R>(acc_v, body.B);
   }
   Report report;
   report.list("fk", p_WJ);
@@ -101,31 +114,32 @@ template <class R> void compare(const std::vector<double>& numbers) {
   report.list("aba_derivatives_q", acc_q);
   report.list("aba_derivatives_v", acc_v);
 
-  RigidBody<R, Counting> counted;
-  counted.load(samples, 0);
-  report.number("flops_fk", count_flops([&] { counted.fk(); }));
-  report.number("flops_rnea", count_flops([&] { counted.rnea(); }));
-  report.number("flops_aba", count_flops([&] { counted.aba(); }));
-  report.number("flops_crba", count_flops([&] { counted.crba(); }));
-  report.number("flops_rnea_derivatives", count_flops([&] { counted.rnea_derivatives(); }));
-  report.number("flops_aba_derivatives", count_flops([&] { counted.aba_derivatives(); }));
+  static RigidBody<R, Counting> counted;
+  const State<R, Counting> s(samples, 0);
+  report.number("flops_fk", count_flops([&] { counted.fk(s); }));
+  report.number("flops_rnea", count_flops([&] { counted.rnea(s); }));
+  report.number("flops_aba", count_flops([&] { counted.aba(s); }));
+  report.number("flops_crba", count_flops([&] { counted.crba(s); }));
+  report.number("flops_rnea_derivatives", count_flops([&] { counted.rnea_derivatives(s); }));
+  report.number("flops_aba_derivatives", count_flops([&] { counted.aba_derivatives(s); }));
 }
 
-// The samples are loaded before the clock starts: a lane's state arrives in lanes from the solver, too.
+// The states are loaded before the clock starts: a lane's state arrives in lanes from the solver, too.
 template <class R, class S>
 void time(Report& report, const std::string& suffix, const std::vector<Sample<R>>& samples, int passes) {
-  std::vector<RigidBody<R, S>> bodies((samples.size() + lanes_of<S> - 1) / lanes_of<S>);
-  for (std::size_t i = 0; i < bodies.size(); ++i) bodies[i].load(samples, i * lanes_of<S>);
-  const auto measure = [&](const char* name, void (RigidBody<R, S>::*algorithm)()) {
+  using Body = RigidBody<R, S>;
+  static Body body;
+  std::vector<State<R, S>> states;
+  for (std::size_t i = 0; i < samples.size(); i += lanes_of<S>) states.emplace_back(samples, i);
+  const auto measure = [&](const char* name, void (Body::*algorithm)(const State<R, S>&)) {
     const auto pass = [&] {
-      for (auto& body : bodies) {
-        (body.*algorithm)();
+      for (const State<R, S>& state : states) {
+        (body.*algorithm)(state);
         ::bench::keep(body);
       }
     };
-    report.list((name + suffix).c_str(), sample_us(passes, pass, double(bodies.size() * lanes_of<S>)));
+    report.list((name + suffix).c_str(), sample_us(passes, pass, double(states.size() * lanes_of<S>)));
   };
-  using Body = RigidBody<R, S>;
   measure("fk", &Body::fk);
   measure("rnea", &Body::rnea);
   measure("aba", &Body::aba);

@@ -40,13 +40,7 @@ template <class R, class S> inline void rbd_solve_upper_related(const RbdData<R,
 // d.A and d.f at joint accelerations a, the contact forces taken off d.f. After rbd_contact_dynamics.
 template <class C, class R, class S>
 inline void rbd_contact_accelerate(const S* a, unsigned active, const ContactData<C, S>& cd, RbdData<R, S>& d) {
-  Motion<S> dA[R::nj];
-  for (int i = 0; i < R::nj; ++i) {
-    const int p = R::parent[i];
-    dA[i] = rbd_add_joint_motion(d, i, a, p < 0 ? Motion<S>::zero() : dA[p]);
-    d.A[i] += dA[i];
-    d.f[i] = mul_add(d.Y[i], dA[i], d.f[i]);
-  }
+  rbd_accelerate(a, d);
   rbd_take_contact_forces(active, cd, d);
 }
 

@@ -50,25 +50,32 @@ template <class R> inline void rbd_crba_lower(const RbdData<R, double>& d, Branc
 
 // The same from the placements alone. After rbd_kinematics; overwrites d.Yc.
 template <class R, class S> inline void rbd_crba_branches(RbdData<R, S>& d, BranchMatrix<R, S>& M) {
-  for (int i = 0; i < R::nj; ++i) d.Yc[i] = inertia_in_world(d.R_WJ[i], d.p_WJ[i], R::mass[i], R::com[i], R::inertia[i]);
+  rbd_body_inertias(d, d.Yc);
   for (int i = R::nj - 1; i >= 0; --i) {
     if (const int p = R::parent[i]; p >= 0) d.Yc[p] += d.Yc[i];
   }
   rbd_crba_lower(d, M);
 }
 
-// M (nv x nv), symmetric, armature included. After rbd_kinematics; overwrites d.Yc.
-template <class R, class S> inline void rbd_crba(RbdData<R, S>& d, Mat<S, R::nv, R::nv>& M) {
+// The entries of the upper triangle of M (nv x nv) that the tree's branches leave; the others are not written. After rbd_kinematics;
+// overwrites d.Yc. What Pinocchio's crba leaves behind.
+template <class R, class Matrix, class S> inline void rbd_crba_upper(RbdData<R, S>& d, Matrix& M) {
   constexpr const Tree<R>& tree = kTree<R>;
   BranchMatrix<R, S> lower;
   rbd_crba_branches(d, lower);
-  M.setZero();
   for (int k = 0; k < R::nv; ++k) {
     M(k, k) = lower.diagonal[k];
-    for (int e = tree.first[k]; e < tree.first[k] + tree.depth[k]; ++e) {
-      const int j = tree.ancestor[e];
-      M(k, j) = M(j, k) = lower.below[e];
-    }
+    for (int e = tree.first[k]; e < tree.first[k] + tree.depth[k]; ++e) M(tree.ancestor[e], k) = lower.below[e];
+  }
+}
+
+// M (nv x nv), symmetric, armature included. After rbd_kinematics; overwrites d.Yc.
+template <class R, class S> inline void rbd_crba(RbdData<R, S>& d, Mat<S, R::nv, R::nv>& M) {
+  constexpr const Tree<R>& tree = kTree<R>;
+  M.setZero();
+  rbd_crba_upper(d, M);
+  for (int k = 0; k < R::nv; ++k) {
+    for (int e = tree.first[k]; e < tree.first[k] + tree.depth[k]; ++e) M(k, tree.ancestor[e]) = M(tree.ancestor[e], k);
   }
 }
 

@@ -40,63 +40,82 @@ template <class S> ENGRAM_INLINE Coriolis<S> coriolis_of(const Inertia<S>& Y, co
   const Vec3<S> w2 = V.ang * S(2.0), u2 = V.lin * S(2.0);
   C.p2 = cross_add<S>(w2, Y.moment, u2 * Y.mass);
   const S trace = dot(u2, Y.moment);
-  const auto minus_column = [&](const Vec3<S>& e, S moment) { return -cross_add(w2, e, u2 * moment); };
+  const auto minus_column = [&](const Vec3<S>& e, S moment) ENGRAM_INLINE_LAMBDA { return -cross_add(w2, e, u2 * moment); };
   C.D = {minus_column({half_trace - Y.I[0], -Y.I[1], -Y.I[2]}, Y.moment[0]) + Vec3<S>(trace, S(0.0), S(0.0)),
          minus_column({-Y.I[1], half_trace - Y.I[3], -Y.I[4]}, Y.moment[1]) + Vec3<S>(S(0.0), trace, S(0.0)),
          minus_column({-Y.I[2], -Y.I[4], half_trace - Y.I[5]}, Y.moment[2]) + Vec3<S>(S(0.0), S(0.0), trace)};
   return C;
 }
 
+// What column k and body i contribute.
+template <class R, class S> struct BranchDerivatives {
+  Motion<S> dAdq[R::nv], dAdv[R::nv];
+  Vec3<S> dVdq[R::nv];   // angular part: all that C sees
+  Force<S> f[R::nj];     // of the body, then of the subtree
+  Coriolis<S> C[R::nj];  // likewise
+
+  ENGRAM_INLINE explicit BranchDerivatives(const RbdData<R, S>& d) {
+    for (int i = 0; i < R::nj; ++i) {
+      const int p = R::parent[i];
+      f[i] = d.f[i];
+      C[i] = coriolis_of(d.Y[i], d.V[i]);
+      for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) {
+        if (p < 0) {
+          dVdq[k].setZero();
+          dAdq[k] = cross(rbd_gravity_acceleration<R, S>(), d.J[k]);
+          dAdv[k] = cross(d.V[i], d.J[k]);
+        } else {
+          const Motion<S> dV = cross(d.V[p], d.J[k]);
+          dVdq[k] = dV.ang;
+          dAdq[k] = cross_add(d.A[p], d.J[k], cross(d.V[p], dV));
+          dAdv[k] = dV * S(2.0);  // V_i x J = V_p x J: J is a single column
+        }
+      }
+    }
+    for (int i = R::nj - 1; i >= 0; --i) {
+      if (const int p = R::parent[i]; p >= 0) {
+        f[p] += f[i];
+        C[p] += C[i];
+      }
+    }
+  }
+};
+
+// What row and column k of the derivatives are made of, a dof j towards the root at a time:
+//   column k, row j:  J_j . dF_k;   row k, column j:  J_k . (Yc dA_j + C dV_j) = (Yc J_k) . dA_j + g . w(dV_j)
+template <class S> struct BranchRow {
+  Force<S> dFdq, dFdv, F;  // dFdq seen from the joints before k's: the force of the subtree turns with dof k
+  Vec3<S> g;
+  S diagonal_q, diagonal_v;
+
+  template <class R> ENGRAM_INLINE BranchRow(const RbdData<R, S>& d, const BranchDerivatives<R, S>& b, int k) {
+    const int i = kTree<R>.joint[k];
+    const Motion<S>& J = d.J[k];
+    dFdv = b.C[i].times_add(J.ang, d.Yc[i] * b.dAdv[k]);
+    dFdq = b.C[i].times_add(b.dVdq[k], d.Yc[i] * b.dAdq[k]);
+    diagonal_v = dot(J, dFdv);
+    diagonal_q = dot(J, dFdq);
+    if (R::parent[i] >= 0) dFdq = cross_add(J, b.f[i], dFdq);
+    F = d.Yc[i] * J;
+    g = b.C[i].transposed_times(J);
+  }
+};
+
 // The entries of d tau / d q and d tau / d v whose dofs lie on one branch; the others are zero and are not written.
 template <class R, class S> inline void rbd_rnea_derivatives_on_branches(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& dtau_dq,
                                                                          Mat<S, R::nv, R::nv>& dtau_dv) {
   constexpr const Tree<R>& tree = kTree<R>;
-  Motion<S> dAdq[R::nv], dAdv[R::nv];
-  Vec3<S> dVdq[R::nv];   // angular part: all that C sees
-  Force<S> f[R::nj];     // of the subtree
-  Coriolis<S> C[R::nj];  // of the subtree
-
-  for (int i = 0; i < R::nj; ++i) {
-    const int p = R::parent[i];
-    f[i] = d.f[i];
-    C[i] = coriolis_of(d.Y[i], d.V[i]);
-    for (int k = R::iv[i]; k <= kTree<R>.last[i]; ++k) {
-      if (p < 0) {
-        dVdq[k].setZero();
-        dAdq[k] = cross(rbd_gravity_acceleration<R, S>(), d.J[k]);
-        dAdv[k] = cross(d.V[i], d.J[k]);
-      } else {
-        const Motion<S> dV = cross(d.V[p], d.J[k]);
-        dVdq[k] = dV.ang;
-        dAdq[k] = cross_add(d.A[p], d.J[k], cross(d.V[p], dV));
-        dAdv[k] = dV * S(2.0);  // V_i x J = V_p x J: J is a single column
-      }
-    }
-  }
+  const BranchDerivatives<R, S> b(d);
   for (int k = R::nv - 1; k >= 0; --k) {
-    const int i = tree.joint[k];
-    const Motion<S>& J = d.J[k];
-    // column k, rows towards the root: J_j . dF_k
-    const Force<S> dFdv = C[i].times_add(J.ang, d.Yc[i] * dAdv[k]);
-    const Force<S> dFdq = C[i].times_add(dVdq[k], d.Yc[i] * dAdq[k]);
-    // seen from the joints before i, the force f of the subtree turns with dof k
-    const Force<S> dFdq_turned = R::parent[i] < 0 ? dFdq : cross_add(J, f[i], dFdq);
-    // row k, columns towards the root: J_k . (Yc dA_j + C dV_j) = (Yc J_k) . dA_j + g . w(dV_j)
-    const Force<S> F = d.Yc[i] * J;
-    const Vec3<S> g = C[i].transposed_times(J);
-    dtau_dv(k, k) = dot(J, dFdv);
-    dtau_dq(k, k) = dot(J, dFdq);
+    const BranchRow<S> row(d, b, k);
+    dtau_dv(k, k) = row.diagonal_v;
+    dtau_dq(k, k) = row.diagonal_q;
     for (int e = tree.first[k]; e < tree.first[k] + tree.depth[k]; ++e) {
       const int j = tree.ancestor[e];
-      dtau_dv(j, k) = dot(d.J[j], dFdv);
-      dtau_dq(j, k) = dot(d.J[j], dFdq_turned);
-      dtau_dv(k, j) = dot_add(g, d.J[j].ang, dot(dAdv[j], F));
-      dtau_dq(k, j) = dot_add(g, dVdq[j], dot(dAdq[j], F));
-    }
-    // hand the subtree on once the first dof of joint i is done
-    if (const int p = R::parent[i]; p >= 0 && k == R::iv[i]) {
-      f[p] += f[i];
-      C[p] += C[i];
+      dtau_dv(j, k) = dot(d.J[j], row.dFdv);
+      dtau_dq(j, k) = dot(d.J[j], row.dFdq);
+      dtau_dv(k, j) = dot_add(row.g, d.J[j].ang, dot(b.dAdv[j], row.F));
+      dtau_dq(k, j) = dot_add(row.g, b.dVdq[j], dot(b.dAdq[j], row.F));
     }
   }
 }
@@ -109,11 +128,8 @@ inline void rbd_rnea_derivatives(const RbdData<R, S>& d, Mat<S, R::nv, R::nv>& d
   rbd_rnea_derivatives_on_branches(d, dtau_dq, dtau_dv);
 }
 
-// d a / d q, d a / d v and M^-1 = d a / d tau (nv x nv each):  d a = M^-1 (d tau - dtau_dq dq - dtau_dv dv).
-// Call right after rbd_forward_dynamics(q, v, tau, d, a); overwrites d.A and d.f with their values at a. No heap; cannot fail.
-template <class R, class S> inline void rbd_forward_derivatives(RbdData<R, S>& d, const S* a, Mat<S, R::nv, R::nv>& da_dq,
-                                                                Mat<S, R::nv, R::nv>& da_dv, Mat<S, R::nv, R::nv>& Minv) {
-  // accelerations and forces are affine in a: add J a and Y J a
+// d.A and d.f, left at zero joint acceleration by rbd_forward_dynamics, at joint accelerations a. Both are affine: add J a and Y J a.
+template <class R, class S> inline void rbd_accelerate(const S* a, RbdData<R, S>& d) {
   Motion<S> dA[R::nj];
   for (int i = 0; i < R::nj; ++i) {
     const int p = R::parent[i];
@@ -121,6 +137,13 @@ template <class R, class S> inline void rbd_forward_derivatives(RbdData<R, S>& d
     d.A[i] += dA[i];
     d.f[i] = mul_add(d.Y[i], dA[i], d.f[i]);
   }
+}
+
+// d a / d q, d a / d v and M^-1 = d a / d tau (nv x nv each):  d a = M^-1 (d tau - dtau_dq dq - dtau_dv dv).
+// Call right after rbd_forward_dynamics(q, v, tau, d, a); overwrites d.A and d.f with their values at a. No heap; cannot fail.
+template <class R, class S> inline void rbd_forward_derivatives(RbdData<R, S>& d, const S* a, Mat<S, R::nv, R::nv>& da_dq,
+                                                                Mat<S, R::nv, R::nv>& da_dv, Mat<S, R::nv, R::nv>& Minv) {
+  rbd_accelerate(a, d);
   rbd_rnea_derivatives_on_branches(d, da_dq, da_dv);
   S minus_D_inv[R::nv];
   for (int k = 0; k < R::nv; ++k) minus_D_inv[k] = -d.D_inv[k];

@@ -40,8 +40,37 @@ template <class S> ENGRAM_INLINE Mat3<S> rotation_of(const S* quat) {
           {madd(x, z2, w * y2), msub(y, z2, w * x2), nmadd(x, x2, nmadd(y, y2, S(1.0)))}};
 }
 
+// Sine and cosine of the angle of a joint.
+template <class R, class S> struct JointAngles {
+  const S* q;
+
+  ENGRAM_INLINE explicit JointAngles(const S* q) : q(q) {}
+  ENGRAM_INLINE void at(int i, S& s, S& c) const { sincos(q[R::iq[i]], s, c); }
+};
+
+// Of one state: all joints beforehand, as many side by side as a Pack holds.
+template <class R> struct JointAngles<R, double> {
+  double sine[R::nj + kLanes], cosine[R::nj + kLanes];
+
+  ENGRAM_INLINE explicit JointAngles(const double* q) {
+    for (int i = 0; i < R::nj; i += kLanes) {
+      Pack angle(0.0), s, c;
+      for (int l = 0; l < kLanes && i + l < R::nj; ++l)
+        if (R::kind[i + l] == kRevolute) angle.set(l, q[R::iq[i + l]]);
+      sincos(angle, s, c);
+      store_pack(s, sine + i);
+      store_pack(c, cosine + i);
+    }
+  }
+  ENGRAM_INLINE void at(int i, double& s, double& c) const {
+    s = sine[i];
+    c = cosine[i];
+  }
+};
+
 // q (nq) -> d.R_WJ, d.p_WJ, d.J
 template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>& d) {
+  const JointAngles<R, S> angles(q);
   for (int i = 0; i < R::nj; ++i) {
     // joint frame at q_i = 0
     Mat3<S> R_WJ = constant33<S>(R::R_PJ[i]);
@@ -62,7 +91,7 @@ template <class R, class S> inline void rbd_kinematics(const S* q, RbdData<R, S>
       }
     } else if (R::kind[i] == kRevolute) {
       S s, c;
-      sincos(qi[0], s, c);
+      angles.at(i, s, c);
       const Vec3<S> x = R_WJ.column(0), y = R_WJ.column(1), z = R_WJ.column(2);
       R_WJ = {madd(x, c, y * s), madd(y, c, x * -s), z};
       J[0] = {cross(p_WJ, z), z};
@@ -90,10 +119,59 @@ template <class R, class S> inline void rbd_velocity(const S* v, RbdData<R, S>& 
   }
 }
 
-// d.Y: inertia of every body. After rbd_kinematics.
-template <class R, class S> inline void rbd_inertias(RbdData<R, S>& d) {
-  for (int i = 0; i < R::nj; ++i) d.Y[i] = inertia_in_world(d.R_WJ[i], d.p_WJ[i], R::mass[i], R::com[i], R::inertia[i]);
+// Y (nj): inertia of every body. After rbd_kinematics.
+template <class R, class S> inline void rbd_body_inertias(const RbdData<R, S>& d, Inertia<S>* Y) {
+  for (int i = 0; i < R::nj; ++i) {
+    S Ic[6];
+    for (int e = 0; e < 6; ++e) Ic[e] = S(R::inertia[i][e]);
+    Y[i] = inertia_in_world(d.R_WJ[i], d.p_WJ[i], S(R::mass[i]), constant3<S>(R::com[i]), Ic);
+  }
 }
+
+// Mass, centre of mass and inertia of the bodies, entry by entry; zero beyond the last.
+template <class R> struct BodyConstants {
+  double entry[10][R::nj + kLanes] = {};
+
+  constexpr BodyConstants() {
+    for (int i = 0; i < R::nj; ++i) {
+      entry[0][i] = R::mass[i];
+      for (int e = 0; e < 3; ++e) entry[1 + e][i] = R::com[i][e];
+      for (int e = 0; e < 6; ++e) entry[4 + e][i] = R::inertia[i][e];
+    }
+  }
+};
+template <class R> inline constexpr BodyConstants<R> kBodyConstants{};
+
+// Of one state: as many bodies side by side as a Pack holds.
+template <class R> inline void rbd_body_inertias(const RbdData<R, double>& d, Inertia<double>* Y) {
+  for (int i = 0; i < R::nj; i += kLanes) {
+    const int n = R::nj - i < kLanes ? R::nj - i : kLanes;
+    const auto constant = [&](int e) { return load_pack(kBodyConstants<R>.entry[e] + i); };
+    const auto gather = [&](auto entry) ENGRAM_INLINE_LAMBDA {
+      Pack x;
+      for (int l = 0; l < kLanes; ++l) x.set(l, entry(l < n ? i + l : i));
+      return x;
+    };
+    Mat3<Pack> R_WJ;
+    Vec3<Pack> p_WJ;
+    for (int r = 0; r < 3; ++r) {
+      p_WJ[r] = gather([&](int b) { return d.p_WJ[b][r]; });
+      for (int c = 0; c < 3; ++c) R_WJ(r, c) = gather([&](int b) { return d.R_WJ[b](r, c); });
+    }
+    const Pack Ic[6] = {constant(4), constant(5), constant(6), constant(7), constant(8), constant(9)};
+    const Inertia<Pack> side_by_side =
+        inertia_in_world(R_WJ, p_WJ, constant(0), Vec3<Pack>(constant(1), constant(2), constant(3)), Ic);
+    for (int l = 0; l < n; ++l) {
+      Inertia<double>& y = Y[i + l];
+      y.mass = R::mass[i + l];
+      for (int r = 0; r < 3; ++r) y.moment[r] = side_by_side.moment[r][l];
+      for (int e = 0; e < 6; ++e) y.I[e] = side_by_side.I[e][l];
+    }
+  }
+}
+
+// d.Y: inertia of every body. After rbd_kinematics.
+template <class R, class S> inline void rbd_inertias(RbdData<R, S>& d) { rbd_body_inertias(d, d.Y); }
 
 // Acceleration of the world that stands in for gravity.
 template <class R, class S> ENGRAM_INLINE Motion<S> rbd_gravity_acceleration() {

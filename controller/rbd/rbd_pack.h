@@ -16,6 +16,7 @@
 // For arithmetic of a few instructions. In long translation units GCC stops inlining what is merely `inline`, and a call costs more
 // than the arithmetic (forward kinematics: 2.5 times as long).
 #define ENGRAM_INLINE inline __attribute__((always_inline))
+#define ENGRAM_INLINE_LAMBDA __attribute__((always_inline))
 
 namespace engram {
 

@@ -37,21 +37,21 @@ template <class S> ENGRAM_INLINE Vec3<S> madd(const Vec3<S>& a, S s, const Vec3<
 
 // A x, written as a sum of columns
 template <class S> ENGRAM_INLINE Vec3<S> mul(const Mat3<S>& A, const Vec3<S>& x) {
-  const auto row = [&](int i) { return madd(A(i, 0), x[0], madd(A(i, 1), x[1], A(i, 2) * x[2])); };
+  const auto row = [&](int i) ENGRAM_INLINE_LAMBDA { return madd(A(i, 0), x[0], madd(A(i, 1), x[1], A(i, 2) * x[2])); };
   return {row(0), row(1), row(2)};
 }
 // y + A x
 template <class S> ENGRAM_INLINE Vec3<S> mul_add(const Mat3<S>& A, const Vec3<S>& x, const Vec3<S>& y) {
-  const auto row = [&](int i) { return madd(A(i, 0), x[0], madd(A(i, 1), x[1], madd(A(i, 2), x[2], y[i]))); };
+  const auto row = [&](int i) ENGRAM_INLINE_LAMBDA { return madd(A(i, 0), x[0], madd(A(i, 1), x[1], madd(A(i, 2), x[2], y[i]))); };
   return {row(0), row(1), row(2)};
 }
 // A' x and y + A' x
 template <class S> ENGRAM_INLINE Vec3<S> mul_transposed(const Mat3<S>& A, const Vec3<S>& x) {
-  const auto row = [&](int i) { return madd(A(0, i), x[0], madd(A(1, i), x[1], A(2, i) * x[2])); };
+  const auto row = [&](int i) ENGRAM_INLINE_LAMBDA { return madd(A(0, i), x[0], madd(A(1, i), x[1], A(2, i) * x[2])); };
   return {row(0), row(1), row(2)};
 }
 template <class S> ENGRAM_INLINE Vec3<S> mul_transposed_add(const Mat3<S>& A, const Vec3<S>& x, const Vec3<S>& y) {
-  const auto row = [&](int i) { return madd(A(0, i), x[0], madd(A(1, i), x[1], madd(A(2, i), x[2], y[i]))); };
+  const auto row = [&](int i) ENGRAM_INLINE_LAMBDA { return madd(A(0, i), x[0], madd(A(1, i), x[1], madd(A(2, i), x[2], y[i]))); };
   return {row(0), row(1), row(2)};
 }
 
@@ -81,6 +81,13 @@ template <class S> ENGRAM_INLINE Vec3<S> mul_symmetric_add(const S* A, const Vec
 template <class S> struct Motion {
   Vec3<S> lin, ang;
 
+  Motion() = default;
+  Motion(const Motion&) = default;
+  ENGRAM_INLINE Motion& operator=(const Motion& b) {
+    lin = b.lin;
+    ang = b.ang;
+    return *this;
+  }
   ENGRAM_INLINE static Motion zero() { return {Vec3<S>::Zero(), Vec3<S>::Zero()}; }
   ENGRAM_INLINE Motion& operator+=(const Motion& b) {
     lin += b.lin;
@@ -100,6 +107,13 @@ template <class S> struct Motion {
 template <class S> struct Force {
   Vec3<S> lin, ang;
 
+  Force() = default;
+  Force(const Force&) = default;
+  ENGRAM_INLINE Force& operator=(const Force& b) {
+    lin = b.lin;
+    ang = b.ang;
+    return *this;
+  }
   ENGRAM_INLINE static Force zero() { return {Vec3<S>::Zero(), Vec3<S>::Zero()}; }
   ENGRAM_INLINE Force& operator+=(const Force& b) {
     lin += b.lin;
@@ -155,19 +169,18 @@ template <class S> struct Inertia {
 
 // Inertia of a body with axes R_WJ and origin p_WJ; constants in its axes: `com`, and `inertia` about the com (xx xy xz yy yz zz).
 //   I = R Ic R' + m (|c|^2 1 - c c')
-template <class S> ENGRAM_INLINE Inertia<S> inertia_in_world(const Mat3<S>& R_WJ, const Vec3<S>& p_WJ, double mass,
-                                                             const double* com, const double* inertia) {
-  const Vec3<S> c = mul_add(R_WJ, constant3<S>(com), p_WJ), mc = c * S(mass);
-  const S Ic[6] = {S(inertia[0]), S(inertia[1]), S(inertia[2]), S(inertia[3]), S(inertia[4]), S(inertia[5])};
+template <class S> ENGRAM_INLINE Inertia<S> inertia_in_world(const Mat3<S>& R_WJ, const Vec3<S>& p_WJ, S mass, const Vec3<S>& com,
+                                                             const S (&inertia)[6]) {
+  const Vec3<S> c = mul_add(R_WJ, com, p_WJ), mc = c * mass;
   const Vec3<S> none = Vec3<S>::Zero();
   Vec3<S> r[3], T[3];  // rows of R and of R Ic
   for (int i = 0; i < 3; ++i) {
     r[i] = R_WJ.row_vector(i);
-    T[i] = mul_symmetric_add(Ic, r[i], none);
+    T[i] = mul_symmetric_add(inertia, r[i], none);
   }
   const S zz = mc[2] * c[2];
   Inertia<S> Y;
-  Y.mass = S(mass);
+  Y.mass = mass;
   Y.moment = mc;
   Y.I[0] = dot_add<S>(T[0], r[0], madd(mc[1], c[1], zz));
   Y.I[1] = dot_add<S>(T[0], r[1], -(mc[0] * c[1]));

@@ -2,7 +2,7 @@
 // Analytic derivatives of inverse dynamics, forward dynamics and gravity against central differences.
 #include <gtest/gtest.h>
 
-#include "controller/rbd/rbd_derivatives.h"
+#include "controller/rbd/rbd_derivatives_rows.h"
 #include "controller/rbd/rbd_manifold.h"
 #include "tests/unit/rbd_test_robots.h"
 
@@ -87,6 +87,27 @@ TYPED_TEST(Derivatives, ForwardDynamics) {
   rbd_crba<TypeParam>(this->d_, M);
   // entries of M up to 1e2, of its inverse up to 1e3: 1e5 eps
   EXPECT_LT(this->worst(M * Minv, TestFixture::MatV::Identity()), 1e-11);
+}
+
+// The versions for one state do the same operations in the same order.
+TYPED_TEST(Derivatives, ByRowsEqualByColumnsBitForBit) {
+  constexpr int nv = TypeParam::nv;
+  typename TestFixture::MatV by_columns[5];
+  static RowMatrix<TypeParam> by_rows[5];
+  const auto tau = this->rnea(this->q_, this->v_, this->a_);
+  rbd_composite_inertias<TypeParam>(this->d_);
+  rbd_rnea_derivatives<TypeParam>(this->d_, by_columns[0], by_columns[1]);
+  rbd_rnea_derivatives<TypeParam>(this->d_, by_rows[0], by_rows[1]);
+  auto a = this->forward(this->q_, this->v_, tau);
+  rbd_forward_derivatives<TypeParam>(this->d_, a.data(), by_columns[2], by_columns[3], by_columns[4]);
+  a = this->forward(this->q_, this->v_, tau);
+  rbd_forward_derivatives<TypeParam>(this->d_, a.data(), by_rows[2], by_rows[3], by_rows[4]);
+  for (int m = 0; m < 5; ++m) {
+    int different = 0;
+    for (int i = 0; i < nv; ++i)
+      for (int j = 0; j < nv; ++j) different += !(by_rows[m](i, j) == by_columns[m](i, j));
+    EXPECT_EQ(different, 0) << "matrix " << m;
+  }
 }
 
 TYPED_TEST(Derivatives, Gravity) {
