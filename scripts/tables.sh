@@ -12,7 +12,13 @@ for description in models/*/*/task.toml; do
   task=$(basename "$(dirname "$description")") robot=$(basename "$(dirname "$(dirname "$description")")")
   "$engram" task "$robot" "$task"
   scripts/setup.sh build
-  grep -q '^kind = "reach"' "$description" || continue  # a motion has no memory to fit
+  if [ "$robot/$task" = talos/step ]; then
+    "$engram" data talos step
+    "$engram" fit talos step
+    scripts/setup.sh build
+    continue
+  fi
+  grep -q '^kind = "reach"' "$description" || continue  # another motion has no memory to fit
   "$engram" data "$robot" "$task"
   "$engram" fit "$robot" "$task"
   scripts/setup.sh build

@@ -8,6 +8,7 @@ NB_MODULE(_engine, engine) {
   engram::binding::bind_arm(engine);
   engram::binding::bind_reach(engine);
   engram::binding::bind_steps(engine);
+  engram::binding::bind_step_memory(engine);
   engram::binding::bind_memory(engine);
   engram::binding::bind_tensor_train(engine);
   engram::binding::bind_tables(engine);

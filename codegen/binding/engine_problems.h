@@ -11,6 +11,7 @@ void bind_memory(nanobind::module_& engine);
 void bind_tensor_train(nanobind::module_& engine);
 void bind_tables(nanobind::module_& engine);
 void bind_steps(nanobind::module_& engine);
+void bind_step_memory(nanobind::module_& engine);
 void bind_study(nanobind::module_& engine);
 
 }  // namespace engram::binding

@@ -1,10 +1,15 @@
 """Steps of Talos: the planner follows its references, the solver lands the foot, frames do not matter, bad feet are refused."""
 
+import json
+
 import numpy as np
 import pytest
 
-from engram.data import steps
+from engram.cli import main
+from engram.data import step_set, steps
 from engram.engine import engine
+from engram.inputs import InputError
+from engram.paths import BUILD
 
 NQ = 39
 
@@ -105,3 +110,30 @@ def test_tasks_stay_within_their_ranges_and_depend_on_seed_foot_and_number_alone
 def test_bad_feet_are_refused(problem, feet, goals, first, what):
     with pytest.raises(ValueError, match=what):
         problem.set(np.array(feet, float), np.array(goals, float), first)
+
+
+def test_a_damaged_or_foreign_data_set_is_one_message(tmp_path):
+    path = tmp_path / "talos_step.npz"
+    with pytest.raises(InputError, match="engram data talos step"):
+        step_set.load(path)
+    step_set.make(2, 9, 1, tmp_path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="cannot be read"):
+        step_set.load(path)
+    path.write_bytes(whole)
+    sets, _, _ = step_set.load(path)
+    assert [len(part) for part in sets] == [2, 2]
+    with np.load(path) as file:
+        np.savez(path, **(dict(file) | {"task_digest": np.uint64(1)}))
+    with pytest.raises(InputError, match="made for another task"):
+        step_set.load(path)
+
+
+def test_the_short_study_starts_warmer_than_cold():
+    """Row 3.3 on a tenth of the data: states and controls together need least iterations, and never fail."""
+    assert main(["study", "3.3", "--quick"]) == 0
+    found = {f["id"]: f["value"] for f in json.loads((BUILD / "figures" / "study.3.3.json").read_text(encoding="utf-8"))}
+    iterations = {part: found[f"study.3.3.iterations.{part}"] for part in ("q", "qu0", "qu", "u", "cold")}
+    assert min(iterations, key=iterations.get) == "qu" and iterations["qu"] < 3 < iterations["cold"]
+    assert found["study.3.3.success.qu"] == 1.0 and found["study.3.3.subopt1.qu"] < 1e-2

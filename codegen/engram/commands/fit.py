@@ -64,6 +64,11 @@ def run(args: argparse.Namespace) -> int:
     from engram.learn.trust import fit_trust
     from engram.tasks.spec import load_task
 
+    if (args.robot, args.task) == ("talos", "step"):
+        from engram.learn.step_fit import fit_and_write
+
+        fit_and_write(args.data or BUILD / "data" / "talos_step.npz", args.out)
+        return 0
     if args.trials < 10:
         raise InputError("--trials must be at least 10")
     spec = load_task(args.robot, args.task)

@@ -1,0 +1,99 @@
+// The memory of steps in Python: the deployed query, on tables that are still arrays (engram.emit.kinds).
+#include "codegen/binding/arrays.h"
+#include "codegen/binding/engine_problems.h"
+#include "codegen/binding/held_table.h"
+#include "controller/memory/step_memory.h"
+#include "tables/talos_step/task.h"
+
+#include <algorithm>
+#include <ctime>
+#include <memory>
+
+namespace engram::binding {
+namespace {
+
+using Task = tasks::TalosStep;
+
+class StepMemory {
+  using R = Task::Robot;
+  static constexpr int N = Task::nknots, nx = R::nq + R::nv, nu = R::nu;
+
+ public:
+  StepMemory(const nb::object& left, const nb::object& right, const nb::object& path, const nb::object& torque)
+      : left_(left, R::digest, Task::digest),
+        right_(right, R::digest, Task::digest),
+        path_(path, R::digest, Task::digest),
+        torque_(torque, R::digest, Task::digest),
+        tables_{{left_.as<TabGpr>(), right_.as<TabGpr>()}, path_.as<TabPca>(), torque_.as<TabPca>()},
+        work_(std::make_unique<StepWork<Task>>()),
+        guess_(std::make_unique<StepGuess<Task>>()) {
+    char text[TAB_TEXT];
+    if (step_check<Task>(tables_, text) != kTabOk) throw nb::value_error(text);
+  }
+
+  nb::dict query(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0) {
+    if (!ask(feet, goal, foot, x0)) throw nb::value_error("feet, goal or x0: not finite");
+    NewArray xs({N + 1, nx}), us({N, nu});
+    std::copy_n(guess_->x[0], (N + 1) * nx, xs.data());
+    std::copy_n(guess_->u[0], N * nu, us.data());
+    nb::dict result;
+    result["xs"] = xs.release();
+    result["us"] = us.release();
+    result["status"] = tab_status_text(guess_->status);
+    result["deviation"] = guess_->deviation;
+    return result;
+  }
+
+  // Processor time [us] of each of n queries.
+  Out query_us(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0, int n) {
+    NewArray us({std::size_t(n)});
+    for (int i = 0; i < n; ++i) {
+      const double start = thread_us();
+      ask(feet, goal, foot, x0);
+      us.data()[i] = thread_us() - start;
+    }
+    return us.release();
+  }
+
+ private:
+  static double thread_us() {
+    timespec t;
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+    return 1e6 * double(t.tv_sec) + 1e-3 * double(t.tv_nsec);
+  }
+
+  bool ask(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0) {
+    check_shape<2>("feet", feet, {2, 3});
+    check_shape<1>("goal", goal, {3});
+    check_shape<1>("x0", x0, {nx});
+    if (foot != 0 && foot != 1) throw nb::value_error("foot: expected 0 (left) or 1 (right)");
+    double start[2][3], end[3];
+    std::copy_n(feet.data(), 6, start[0]);
+    std::copy_n(goal.data(), 3, end);
+    return step_query<Task, TalosMirror>(tables_, start, end, foot, x0.data(), *work_, *guess_);
+  }
+
+  HeldTable left_, right_, path_, torque_;
+  StepTables tables_;
+  std::unique_ptr<StepWork<Task>> work_;
+  std::unique_ptr<StepGuess<Task>> guess_;
+};
+
+}  // namespace
+
+void bind_step_memory(nb::module_& engine) {
+  using namespace nb::literals;
+  nb::class_<StepMemory>(engine, "TalosStepMemory", "The memory of steps on tables of engram.emit.kinds: regressions, path and torque bases.")
+      .def(nb::init<const nb::object&, const nb::object&, const nb::object&, const nb::object&>(), "left"_a, "right"_a, "path"_a, "torque"_a)
+      .def("query", &StepMemory::query, "feet"_a, "goal"_a, "foot"_a, "x0"_a,
+           "A guess xs (T + 1, nx), us (T, nu) of the step of `foot` from feet (2, 3) to goal (3), from x0; status, deviation.")
+      .def("query_us", &StepMemory::query_us, "feet"_a, "goal"_a, "foot"_a, "x0"_a, "n"_a, "Processor times [us] of n queries.");
+  nb::list other, sign;
+  for (int i = 0; i < TalosMirror::nu; ++i) {
+    other.append(TalosMirror::other[i]);
+    sign.append(TalosMirror::sign[i]);
+  }
+  engine.attr("TALOS_MIRROR") = nb::make_tuple(other, sign);
+}
+
+}  // namespace engram::binding

@@ -1,0 +1,106 @@
+// The memory of steps on the tables of the tree: frames do not matter, the right foot is the left one mirrored, bad input.
+// link: engram_tab engram_tables_talos_step
+// options: -O1
+#include "controller/memory/step_memory.h"
+
+#include "tables/talos_step/tables.h"
+#include "tables/talos_step/task.h"
+
+#include <gtest/gtest.h>
+
+#include <memory>
+
+namespace engram {
+namespace {
+
+using Task = tasks::TalosStep;
+using R = Task::Robot;
+constexpr int nq = R::nq, nv = R::nv, nu = R::nu;
+const StepTables kTables = {{&talos_step_left_v1, &talos_step_right_v1}, &talos_step_path_v1, &talos_step_torque_v1};
+
+struct Query {
+  double feet[2][3] = {{0.02, 0.09, 0.05}, {-0.02, -0.09, -0.05}}, goal[3] = {0.2, 0.1, 0.1}, x0[nq + nv] = {};
+  int foot = 0;
+  std::unique_ptr<StepWork<Task>> work = std::make_unique<StepWork<Task>>();
+  std::unique_ptr<StepGuess<Task>> guess = std::make_unique<StepGuess<Task>>();
+
+  Query() { std::memcpy(x0, R::q_home, sizeof(R::q_home)); }
+  bool ask(const StepTables& tables = kTables) { return step_query<Task, TalosMirror>(tables, feet, goal, foot, x0, *work, *guess); }
+};
+
+TEST(StepMemory, TheTablesOfTheTreeFit) {
+  char text[TAB_TEXT];
+  EXPECT_EQ(step_check<Task>(kTables, text), kTabOk) << text;
+  const StepTables swapped = {{&talos_step_left_v1, &talos_step_right_v1}, &talos_step_torque_v1, &talos_step_path_v1};
+  EXPECT_EQ(step_check<Task>(swapped, text), kTabBad);
+  EXPECT_NE(std::string(text).find("engram fit talos step"), std::string::npos) << text;
+  const StepTables missing = {{&talos_step_left_v1, nullptr}, &talos_step_path_v1, &talos_step_torque_v1};
+  EXPECT_EQ(step_check<Task>(missing, text), kTabBad);
+}
+
+TEST(StepMemory, StartsWhereTheRobotIsAndMovesAsTheIntegratorDoes) {
+  Query q;
+  ASSERT_TRUE(q.ask());
+  EXPECT_EQ(q.guess->status, kTabOk);
+  EXPECT_LT(q.guess->deviation, 0.1);
+  EXPECT_EQ(std::memcmp(q.guess->x[0], q.x0, sizeof(q.x0)), 0);
+  for (int k = 0; k < Task::nknots; ++k) {  // the integrator: q' = q (+) dt v'
+    double dq[nv], next[nq];
+    for (int i = 0; i < nv; ++i) dq[i] = Task::dt * q.guess->x[k + 1][nq + i];
+    rbd_integrate<R>(q.guess->x[k], dq, next);
+    for (int i = 0; i < nq; ++i) EXPECT_NEAR(next[i], q.guess->x[k + 1][i], 1e-12);
+  }
+}
+
+TEST(StepMemory, FramesDoNotMatter) {
+  Query here, there;
+  const double c = std::cos(2.0), s = std::sin(2.0);
+  const auto move = [&](double* p) {
+    const double x = p[0], y = p[1];
+    p[0] = 3.0 + c * x - s * y;
+    p[1] = -1.0 + s * x + c * y;
+    p[2] += 2.0;
+  };
+  for (auto& foot : there.feet) move(foot);
+  move(there.goal);
+  ASSERT_TRUE(here.ask() && there.ask());
+  for (int k = 0; k < Task::nknots; ++k)
+    for (int i = 0; i < nu; ++i) EXPECT_NEAR(here.guess->u[k][i], there.guess->u[k][i], 1e-3);  // features are floats
+}
+
+// Talos' halves differ by some grams: the torques of a mirrored step by less than 3 N m of some hundred.
+TEST(StepMemory, TheRightFootMirrorsTheLeft) {
+  Query left, right;
+  right.foot = 1;
+  for (int f = 0; f < 2; ++f)
+    for (int i = 0; i < 3; ++i) right.feet[f][i] = (i == 0 ? 1.0 : -1.0) * left.feet[1 - f][i];
+  for (int i = 1; i < 3; ++i) right.goal[i] = -left.goal[i];
+  ASSERT_TRUE(left.ask() && right.ask());
+  double largest = 0.0;
+  for (int k = 0; k < Task::nknots; ++k)
+    for (int i = 0; i < nu; ++i) {
+      largest = std::fmax(largest, std::fabs(left.guess->u[k][i]));
+      EXPECT_NEAR(right.guess->u[k][i], TalosMirror::sign[i] * left.guess->u[k][TalosMirror::other[i]], 3.0);
+    }
+  EXPECT_GT(largest, 50.0);
+}
+
+TEST(StepMemory, FarTasksAreSaidToBeFar) {
+  Query q;
+  q.goal[0] = 0.8;
+  ASSERT_TRUE(q.ask());
+  EXPECT_EQ(q.guess->status, kTabOutside);
+  EXPECT_GT(q.guess->deviation, 0.5);
+}
+
+TEST(StepMemory, WhatIsNotFiniteGivesNoGuess) {
+  Query q;
+  q.goal[1] = NAN;
+  EXPECT_FALSE(q.ask());
+  q = Query();
+  q.x0[nq] = HUGE_VAL;
+  EXPECT_FALSE(q.ask());
+}
+
+}  // namespace
+}  // namespace engram
