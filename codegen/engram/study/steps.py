@@ -134,7 +134,7 @@ class Count:
     solved: list[bool]
     cost: list[float]
     best: list[float]
-    first: list[float]  # cost after one iteration
+    first: list[float]  # cost after one iteration, infinite if gaps are left
 
     @staticmethod
     def empty() -> Count:
@@ -148,7 +148,8 @@ class Count:
         self.solved.append(found["converged"])
         self.cost.append(found["cost"])
         self.best.append(best)
-        self.first.append(found["log"][0, 0])
+        closed = found["log"][0, 2] == 1.0  # a shorter step leaves gaps, and a cost beside gaps says nothing
+        self.first.append(found["log"][0, 0] if closed else np.inf)
 
     @property
     def excess(self) -> np.ndarray:
@@ -168,7 +169,7 @@ HEAD = (f"{'guess':<26}{'% done':>7} {'cost':>8}{'':>9}{'iterations':>9}{'':>8} 
         f"{'after 1':>10}   thesis: % done, iterations")  # fmt: skip
 LEGEND = (
     "today: iterations until a full step is expected to gain less than 1e-2; "
-    "excess: mean cost over the converged cold one's; after 1: median after one iteration"
+    "excess: mean cost over the converged cold one's; after 1: median after one iteration, inf: gaps are left"
 )
 
 
@@ -178,7 +179,8 @@ def figures(report: Report, name: str, count: Count) -> None:
     report.figure(f"iterations.{name}", float(np.mean(count.iterations)), n=n)
     report.figure(f"success.{name}", float(np.mean(count.solved)), n=n)
     report.figure(f"excess.{name}", float(np.mean(count.excess)), n=n)
-    report.figure(f"subopt1.{name}", count.suboptimality, n=n)
+    if np.isfinite(count.suboptimality):
+        report.figure(f"subopt1.{name}", count.suboptimality, n=n)
 
 
 def load_sets(quick: bool) -> list[StepData]:
