@@ -27,7 +27,7 @@ demo: setup
 test: setup
 	@scripts/test.sh $(ARGS)
 
-bench: export TARGETS = engram_bench query_bench _engine
+bench: export TARGETS = engram_bench engram_bench_single query_bench _engine
 bench: setup
 	@.venv/bin/python bench/run.py $(ARGS)
 

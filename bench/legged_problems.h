@@ -38,15 +38,15 @@ using TalosUtils = ContactOcp<TalosSoles, StateTerm<Talos>, ControlTerm<Talos, f
                               WrenchConeTerm<0>, WrenchConeTerm<1>>;
 
 // Least-norm controls that hold q at rest: g = B u + J' lambda.
-template <class P> inline void quasi_static(const double* q, unsigned active, double* u) {
+template <class P> inline void quasi_static(const Real* q, unsigned active, Real* u) {
   using R = typename P::R;
   using C = typename P::Contacts;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
-  auto d = std::make_unique<RbdData<R, double>>();
-  ContactData<C, double> cd;
-  double g[P::nv];
+  auto d = std::make_unique<RbdData<R, Real>>();
+  ContactData<C, Real> cd;
+  Vec<Real, P::nv> g;
   rbd_kinematics(q, *d);
-  rbd_gravity(*d, g);
+  rbd_gravity(*d, g.data());
   rbd_contact_jacobians(*d, active, cd);
   const ActiveRows<C> rows(active);
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(P::nv, P::nu + rows.n);
@@ -56,7 +56,7 @@ template <class P> inline void quasi_static(const double* q, unsigned active, do
   for (int c = 0; c < C::n; ++c)
     for (int r = 0; contact_active(active, c) && r < tree.rows[c]; ++r, ++column)
       for (int a = 0; a < tree.path_n[c]; ++a) A(tree.path[c][a], column) = motion_entry(cd.J[c][a], r);
-  const Eigen::VectorXd solution = A.completeOrthogonalDecomposition().solve(Eigen::Map<Eigen::VectorXd>(g, P::nv));
+  const Eigen::VectorXd solution = A.completeOrthogonalDecomposition().solve(g.template cast<double>());
   for (int i = 0; i < P::nu; ++i) u[i] = solution[i];
 }
 
@@ -73,17 +73,17 @@ template <class P, int N> void legged_cold_start(const Horizon<P, N>& h, FddpSol
 // Steps of Talos on flat ground, 40 ms knots: per step 7 knots of double support, 15 of swing, the touch-down; then double support.
 template <class P, int N> class TalosWalk {
  public:
-  TalosWalk(int T, int steps, double length, Horizon<P, N>& h) : h_(h) {
+  TalosWalk(int T, int steps, Real length, Horizon<P, N>& h) : h_(h) {
     constexpr int kDouble = 7, kSwing = 15;
     constexpr double kHeight = 0.1;
     h = {};
     h.n = T;
     for (int i = 0; i < P::nq; ++i) h.x0[i] = Talos::q_home[i];
-    auto d = std::make_unique<RbdData<Talos, double>>();
+    auto d = std::make_unique<RbdData<Talos, Real>>();
     rbd_kinematics(h.x0, *d);
     rbd_subtree_moments(*d);
-    Vec3<double> foot[2], com = rbd_com(*d);
-    Mat3<double> R;
+    Vec3<Real> foot[2], com = rbd_com(*d);
+    Mat3<Real> R;
     for (int f = 0; f < 2; ++f) rbd_frame_placement(*d, TalosSoles::frame[f], R, foot[f]);
     com[0] = 0.5 * (foot[0][0] + foot[1][0]);
     com[1] = 0.5 * (foot[0][1] + foot[1][1]);
@@ -93,7 +93,7 @@ template <class P, int N> class TalosWalk {
       for (int i = 0; i < kDouble; ++i) in_time(k++, kLeftFoot | kRightFoot);
       const int swing = s % 2 == 0 ? 1 : 0;  // right first
       const double stride = s == 0 ? length : 2 * length;
-      Vec3<double> target = foot[swing];
+      Vec3<Real> target = foot[swing];
       for (int i = 0; i < kSwing; ++i, ++k) {
         const double phase = kSwing / 2.0, done = double(i + 1) / kSwing;
         target = foot[swing];
@@ -104,7 +104,7 @@ template <class P, int N> class TalosWalk {
           if (i == kSwing / 2) place(k, swing, target, kStep * 1e6);
         } else {
           place(k, swing, target, kStep * 1e6);
-          Vec3<double> c = com;
+          Vec3<Real> c = com;
           c[0] += 0.5 * stride * done;
           track_com(k, c);
         }
@@ -119,9 +119,9 @@ template <class P, int N> class TalosWalk {
  private:
   static constexpr bool kThesis = std::is_same_v<P, TalosThesis>;
   static constexpr double kStep = 0.04;
-  using Knot = typename P::template Knot<double>;
-  template <int f> using FootParam = typename TalosFoot<f>::template Param<double>;
-  template <int f> using ConeParam = typename WrenchConeTerm<f>::template Param<double>;
+  using Knot = typename P::template Knot<Real>;
+  template <int f> using FootParam = typename TalosFoot<f>::template Param<Real>;
+  template <int f> using ConeParam = typename WrenchConeTerm<f>::template Param<Real>;
   Horizon<P, N>& h_;
 
   // Weights of |x (-) x0|^2: base position, base orientation, joints, velocities.
@@ -152,23 +152,23 @@ template <class P, int N> class TalosWalk {
     p.wrench_half[1] = 0.025;
     p.wrench_x[0] = 1.0;
   }
-  void touch_down(int k, int foot, const Vec3<double>& target) {
+  void touch_down(int k, int foot, const Vec3<Real>& target) {
     h_.phase[k] = kImpact | (foot == 0 ? kLeftFoot : kRightFoot);
     weigh_state(h_.knot[k], 1e1, 1e1, 1e1 * (0.1 * 0.1), 1e1 * (10.0 * 10.0));
     place(k, foot, target, 1e8);
   }
-  void place(int k, int foot, const Vec3<double>& p, double w) {
+  void place(int k, int foot, const Vec3<Real>& p, double w) {
     if (foot == 0) place(static_cast<FootParam<0>&>(h_.knot[k]), p, w);
     else place(static_cast<FootParam<1>&>(h_.knot[k]), p, w);
   }
-  template <class Foot> static void place(Foot& foot, const Vec3<double>& p, double w) {
+  template <class Foot> static void place(Foot& foot, const Vec3<Real>& p, double w) {
     foot.placement_w = w;
     for (int i = 0; i < 3; ++i) {
       foot.placement_p[i] = p[i];
       foot.placement_R[4 * i] = 1.0;
     }
   }
-  void track_com(int k, const Vec3<double>& c) {
+  void track_com(int k, const Vec3<Real>& c) {
     if constexpr (!kThesis) {
       for (int i = 0; i < 3; ++i) {
         h_.knot[k].com_w[i] = kStep * 1e6;
@@ -208,11 +208,11 @@ template <int N> class AnymalTrot {
     h = {};
     h.n = kTrotKnots;
     for (int i = 0; i < AnymalProblem::nq; ++i) h.x0[i] = Anymal::q_home[i];
-    auto d = std::make_unique<RbdData<Anymal, double>>();
+    auto d = std::make_unique<RbdData<Anymal, Real>>();
     rbd_kinematics(h.x0, *d);
     rbd_subtree_moments(*d);
-    Vec3<double> foot[4], com = rbd_com(*d);
-    Mat3<double> R;
+    Vec3<Real> foot[4], com = rbd_com(*d);
+    Mat3<Real> R;
     com[0] = com[1] = 0.0;
     for (int f = 0; f < 4; ++f) {
       rbd_frame_placement(*d, AnymalFeet::frame[f], R, foot[f]);
@@ -223,7 +223,7 @@ template <int N> class AnymalTrot {
       const unsigned swings = 1u << pairs[pair][0] | 1u << pairs[pair][1];
       const double stride = pair == 0 ? 0.5 * kStride : kStride;
       for (int i = 0; i < kStand; ++i) in_time(k++, 15u);
-      Vec3<double> target[2];
+      Vec3<Real> target[2];
       for (int i = 0; i < kSwing; ++i, ++k) {
         const double phase = kSwing / 2.0, done = double(i + 1) / kSwing;
         in_time(k, 15u & ~swings);
@@ -251,7 +251,7 @@ template <int N> class AnymalTrot {
   }
 
  private:
-  using Knot = typename AnymalProblem::template Knot<double>;
+  using Knot = typename AnymalProblem::template Knot<Real>;
   static constexpr double kStep = 0.01;
   Horizon<AnymalProblem, N>& h_;
 
@@ -277,16 +277,16 @@ template <int N> class AnymalTrot {
     cone<3>(knot, support, scale);
   }
   template <int foot> static void cone(Knot& knot, unsigned support, double scale) {
-    auto& p = static_cast<typename FrictionConeTerm<foot>::template Param<double>&>(knot);
+    auto& p = static_cast<typename FrictionConeTerm<foot>::template Param<Real>&>(knot);
     p.friction_w = contact_active(support, foot) ? scale * 1e1 : 0.0;
     p.friction_mu = 0.7;
   }
-  template <int foot> static void place(Knot& knot, const Vec3<double>& p, double w) {
-    auto& term = static_cast<typename AnymalFoot<foot>::template Param<double>&>(knot);
+  template <int foot> static void place(Knot& knot, const Vec3<Real>& p, double w) {
+    auto& term = static_cast<typename AnymalFoot<foot>::template Param<Real>&>(knot);
     term.translation_w = w;
     for (int i = 0; i < 3; ++i) term.translation_p[i] = p[i];
   }
-  void place(int k, int foot, const Vec3<double>& p, double w) {
+  void place(int k, int foot, const Vec3<Real>& p, double w) {
     Knot& knot = h_.knot[k];
     foot == 0 ? place<0>(knot, p, w) : foot == 1 ? place<1>(knot, p, w) : foot == 2 ? place<2>(knot, p, w) : place<3>(knot, p, w);
   }

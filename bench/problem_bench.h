@@ -2,7 +2,9 @@
 #ifndef BENCH_PROBLEM_BENCH_H_
 #define BENCH_PROBLEM_BENCH_H_
 
+#ifndef ENGRAM_SINGLE
 #include "bench/counting.h"
+#endif
 #include "bench/stopwatch.h"
 #include "codegen/offline/dense_model.h"
 #include "controller/fddp/fddp_solve.h"
@@ -20,7 +22,8 @@ using ::bench::Report;
 using ::bench::sample_us;
 
 constexpr double kStop = 1e-9;
-constexpr int kMaxIterations = 200;
+// In single precision kStop is below the rounding of a cost; it does not get better after so many.
+constexpr int kMaxIterations = sizeof(Real) == sizeof(double) ? 200 : 30;
 constexpr double kDisplacement = 1e-3;  // of the first state, in every tangent direction: what one control period sees
 
 constexpr int kMaxKnots = 100;
@@ -68,7 +71,7 @@ template <class P, int N> std::vector<double> flat_controls(const Horizon<P, N>&
 
 // The cost of knot k alone, which the solver only sums.
 template <class P, int N> double cost_of_knot(const Horizon<P, N>& h, const FddpSolution<P, N>& s, int k) {
-  double x_next[P::nx], cost;
+  Real x_next[P::nx], cost;
   if (k == h.n) P::calc_terminal(h.knot[k], s.x[k], cost);
   else if constexpr (P::kPhases) P::calc(h.phase[k], h.knot[k], s.x[k], s.u[k], x_next, cost);
   else P::calc(h.knot[k], s.x[k], s.u[k], x_next, cost);
@@ -97,15 +100,16 @@ template <class P> double finish_flops(unsigned active) {
   return 2.0 * P::nz * terms;
 }
 
+#ifndef ENGRAM_SINGLE
 // Flops of the phases over the horizon, costs of forces left out of the sweep.
 template <class P> void report_flops(const Problem<P>& problem, Report& report) {
   const auto& [h, w, s, stats] = problem;
   using S = Counting;
-  constexpr int knot_size = sizeof(typename P::template Knot<double>) / sizeof(double);
+  constexpr int knot_size = sizeof(typename P::template Knot<Real>) / sizeof(Real);
   double linearize = 0.0, calc = 0.0;
   for (int k = 0; k <= h.n; ++k) {
     typename P::template Knot<S> knot;
-    for (int e = 0; e < knot_size; ++e) reinterpret_cast<S*>(&knot)[e] = reinterpret_cast<const double*>(&h.knot[k])[e];
+    for (int e = 0; e < knot_size; ++e) reinterpret_cast<S*>(&knot)[e] = reinterpret_cast<const Real*>(&h.knot[k])[e];
     S x[P::nx], u[P::nu], x_next[P::nx], cost;
     for (int i = 0; i < P::nx; ++i) x[i] = s.x[k][i];
     for (int i = 0; i < P::nu; ++i) u[i] = k < h.n ? s.u[k][i] : 0.0;
@@ -129,12 +133,14 @@ template <class P> void report_flops(const Problem<P>& problem, Report& report) 
   report.number("flops_solve1", linearize + backward + forward);
 }
 
+#endif
+
 // Bytes that the phases move between memory and processor at least once, over the horizon: what a knot leaves for the next phase and what
 // that reads of it; the scratch stays in the caches.
 template <class P> void report_bytes(int knots, Report& report) {
-  constexpr double model = sizeof(typename P::LqModel), gains = sizeof(double) * P::nu * P::Layout::nxp;
-  constexpr double parameters = sizeof(typename P::template Knot<double>), point = sizeof(double) * (P::nx + P::nu);
-  constexpr double vectors = sizeof(double) * (2.0 * P::Layout::nxp + P::Layout::nup);  // f, Vf, k
+  constexpr double model = sizeof(typename P::LqModel), gains = sizeof(Real) * P::nu * P::Layout::nxp;
+  constexpr double parameters = sizeof(typename P::template Knot<Real>), point = sizeof(Real) * (P::nx + P::nu);
+  constexpr double vectors = sizeof(Real) * (2.0 * P::Layout::nxp + P::Layout::nup);  // f, Vf, k
   const double calcdiff = knots * (parameters + point + model), backward = knots * (model + gains + vectors);
   const double forward = knots * (parameters + point + gains + vectors + kLanes * point);
   report.number("bytes_calcdiff", calcdiff);
@@ -168,7 +174,7 @@ template <class P> void compare(Problem<P>& problem, const std::vector<double>& 
     }
   }
   Report report;
-  report.list("x0", h.x0, P::nx);
+  report.list("x0", {h.x0, h.x0 + P::nx});
   const char* const names[] = {"cost", "Fx", "Fu", "Lx", "Lu", "Lxx", "Lxu", "Luu"};
   for (int i = 0; i < 8; ++i) report.list(names[i], dense[i]);
   report.list("gap", gap);
@@ -179,15 +185,17 @@ template <class P> void compare(Problem<P>& problem, const std::vector<double>& 
   opts.stop = kStop;
   opts.iterations = kMaxIterations;
   s = *cold;
-  report.list("xs_cold", s.x[0], (n + 1) * P::nx);
+  report.list("xs_cold", {s.x[0], s.x[0] + (n + 1) * P::nx});
   report.list("us_cold", flat_controls(h, s));
   report.number("converged", fddp_solve(h, opts, w, s, stats) == FddpStatus::kConverged);
   report.number("iterations", stats.iterations);
   report.number("cost_converged", s.cost);
+#ifndef ENGRAM_SINGLE  // they are those of double precision
   report_flops(problem, report);
+#endif
   report_bytes<P>(h.n, report);
   report.number("memory", sizeof(problem));
-  report.list("xs_converged", s.x[0], (n + 1) * P::nx);
+  report.list("xs_converged", {s.x[0], s.x[0] + (n + 1) * P::nx});
   report.list("us_converged", flat_controls(h, s));
 }
 
@@ -197,7 +205,8 @@ template <class P> void time(Problem<P>& problem, int samples) {
   FddpOpts opts;
   opts.stop = kStop;
   opts.iterations = kMaxIterations;
-  if (fddp_solve(h, opts, w, s, stats) != FddpStatus::kConverged) fail("does not converge");
+  const FddpStatus status = fddp_solve(h, opts, w, s, stats);
+  if (status != FddpStatus::kConverged && (sizeof(Real) == sizeof(double) || status != FddpStatus::kIterationLimit)) fail("does not converge");
   fddp_linearize(h, s, w);
   fddp_backward(h, opts, w, s);
 
@@ -211,7 +220,7 @@ template <class P> void time(Problem<P>& problem, int samples) {
 
   // one control period: one iteration from the solution, for a first state nearby
   const auto solution = std::make_unique<FddpSolution<P, kMaxKnots>>(s);
-  double dx[L::nxp] = {}, x0[P::nx];
+  Real dx[L::nxp] = {}, x0[P::nx];
   for (int i = 0; i < P::ndx; ++i) dx[padded_index<L>(i)] = kDisplacement;
   P::integrate(h.x0, dx, x0);
   std::copy_n(x0, P::nx, h.x0);

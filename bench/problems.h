@@ -35,8 +35,8 @@ template <int N> void arm_horizon(int T, const double* q0, Horizon<Arm, N>& h) {
 
 // Cold start: stand still at x0 under the gravity torque.
 template <int N> void arm_cold_start(const Horizon<Arm, N>& h, FddpSolution<Arm, N>& s) {
-  RbdData<robots::Panda, double> d;
-  double g[Arm::nv];
+  RbdData<robots::Panda, Real> d;
+  Real g[Arm::nv];
   rbd_kinematics<robots::Panda>(h.x0, d);
   rbd_inertias<robots::Panda>(d);
   rbd_gravity<robots::Panda>(d, g);

@@ -1,7 +1,9 @@
 // RNEA, ABA, CRBA, their derivatives and forward kinematics of Panda and Talos, one state after the other and in lanes.
 #include "bench/rigid_body_bench.h"
 
+#ifndef ENGRAM_SINGLE
 #include "bench/counting.h"
+#endif
 #include "bench/stopwatch.h"
 #include "controller/rbd/rbd_aba.h"
 #include "controller/rbd/rbd_derivatives_rows.h"
@@ -33,7 +35,7 @@ template <class R> std::vector<Sample<R>> split(const std::vector<double>& numbe
 
 // A matrix of derivatives: padded rows for one state, plain ones for states in lanes.
 template <class R, class S> struct DerivativeMatrix { using type = Mat<S, R::nv, R::nv>; };
-template <class R> struct DerivativeMatrix<R, double> { using type = RowMatrix<R>; };
+template <class R> struct DerivativeMatrix<R, Real> { using type = RowMatrix<R>; };
 
 // A state (one state a lane when S = Pack).
 template <class R, class S> struct State {
@@ -84,10 +86,10 @@ template <class R, class M> void append_matrix(std::vector<double>& to, const M&
 
 template <class R> void compare(const std::vector<double>& numbers) {
   const auto samples = split<R>(numbers);
-  static RigidBody<R, double> body;
+  static RigidBody<R, Real> body;
   std::vector<double> p_WJ, tau, acc, M, tau_q, tau_v, acc_q, acc_v;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const State<R, double> s(samples, i);
+    const State<R, Real> s(samples, i);
     body.fk(s);
     for (const auto& p : body.d.p_WJ) p_WJ.insert(p_WJ.end(), p.data(), p.data() + 3);
     body.rnea(s);
@@ -114,6 +116,7 @@ template <class R> void compare(const std::vector<double>& numbers) {
   report.list("aba_derivatives_q", acc_q);
   report.list("aba_derivatives_v", acc_v);
 
+#ifndef ENGRAM_SINGLE  // they are those of double precision
   static RigidBody<R, Counting> counted;
   const State<R, Counting> s(samples, 0);
   report.number("flops_fk", count_flops([&] { counted.fk(s); }));
@@ -122,6 +125,7 @@ template <class R> void compare(const std::vector<double>& numbers) {
   report.number("flops_crba", count_flops([&] { counted.crba(s); }));
   report.number("flops_rnea_derivatives", count_flops([&] { counted.rnea_derivatives(s); }));
   report.number("flops_aba_derivatives", count_flops([&] { counted.aba_derivatives(s); }));
+#endif
 }
 
 // The states are loaded before the clock starts: a lane's state arrives in lanes from the solver, too.
@@ -151,7 +155,7 @@ void time(Report& report, const std::string& suffix, const std::vector<Sample<R>
 template <class R> void time(const std::vector<double>& numbers, int passes) {
   const auto samples = split<R>(numbers);
   Report report;
-  time<R, double>(report, "", samples, passes);
+  time<R, Real>(report, "", samples, passes);
   time<R, Pack>(report, "_lanes", samples, passes);
 }
 

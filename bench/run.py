@@ -3,6 +3,9 @@
 First the gate: both sides compute the same numbers from the same input, to the tolerances below. Then the two executables
 alternate, A B A B, so that a drift of the machine's speed hits both. Times are processor times of one thread; every ratio is
 peer / ours of the medians, and none is printed where the gate does not hold. The figures go to build/figures/bench.json.
+
+Rows that end in .float are our solver and algorithms compiled in single precision (ENGRAM_SINGLE), beside the same peer, in
+double precision, in the same rounds; their gates have tolerances of their own.
 """
 
 from __future__ import annotations
@@ -24,6 +27,11 @@ sys.path[:0] = [str(ROOT / "bench" / "peers"), str(ROOT / "codegen")]
 DERIVATIVE_TOLERANCE = 1e-9
 # Relative; both sides stop on an expected improvement below 1e-9, far inside this.
 COST_TOLERANCE = 1e-8
+# Single precision: the unit of rounding. A product or a recursion over a tree leaves some 30 of them; what is solved with M, as
+# many as its condition, which is computed. Of a solve the cost is compared, a sum of some thousand squares, stationary there.
+ROUNDING = 2.0**-24
+RECURSION_SINGLE = 30 * ROUNDING
+COST_SINGLE = 100 * ROUNDING
 # The stopping criterion may cross its threshold one iteration apart.
 ITERATION_TOLERANCE = 1
 
@@ -107,6 +115,24 @@ def gate(name: str, errors: dict[str, float], tolerance: float) -> bool:
     return holds
 
 
+def gate_rigid_body_single(robot: str, single: dict, peer: dict, nv: int) -> bool:
+    errors = {name: difference(single[name], peer[name]) for name in peer}
+    condition = max(np.linalg.cond(M) for M in np.reshape(peer["crba"], (-1, nv, nv)))
+    solved = {name: error for name, error in errors.items() if name.startswith("aba")}
+    recursive = {name: error for name, error in errors.items() if name not in solved}
+    holds = gate(f"{robot} single, recursions", recursive, RECURSION_SINGLE)
+    return gate(f"{robot} single, solved with M", solved, condition * ROUNDING) and holds
+
+
+def gate_problem_single(name: str, single: dict, double: dict) -> bool:
+    """Costs, their derivatives, and the cost at the end of a solve, beside those of double precision."""
+    errors = {
+        "converged": abs(single["cost_converged"] / double["cost_converged"] - 1),
+        "derivatives": max(difference(single[f], double[f]) for f in ("cost", "Lx", "Lu", "Lxx", "Luu")),
+    }
+    return gate(f"{name} single, costs", errors, COST_SINGLE)
+
+
 def gate_problem(name: str, ours: dict, peer: dict) -> bool:
     errors = {f: difference(ours[f], peer[f]) for f in LINEARIZATION}
     same_model = gate(f"{name} derivatives, gains", errors, PROBLEMS[name].derivatives)
@@ -134,11 +160,11 @@ class Samples:
         return f"{self.us.min():9.3f} {self.median:9.3f} {np.percentile(self.us, 99):9.3f} {self.us.max():9.3f}"
 
 
-def alternate(rounds: int, ours: list, peer: list) -> tuple[dict[str, Samples], dict[str, Samples]]:
-    """Run the two commands in turn; samples by name."""
-    pooled: list[dict[str, list[float]]] = [{}, {}]
+def alternate(rounds: int, *commands: list) -> tuple[dict[str, Samples], ...]:
+    """Run the commands in turn; samples by name."""
+    pooled: list[dict[str, list[float]]] = [{} for _ in commands]
     for _ in range(rounds):
-        for side, command in zip(pooled, (ours, peer), strict=True):
+        for side, command in zip(pooled, commands, strict=True):
             for name, samples in run_json(*command).items():
                 if isinstance(samples, list):
                     side.setdefault(name, []).extend(samples)
@@ -176,13 +202,15 @@ class Figures:
 class Bench:
     def __init__(self, build: Path, rounds: int, n: int) -> None:
         self.ours = build / "bench" / "engram_bench"
+        self.single = build / "bench" / "engram_bench_single"
         self.peers = build / "peers"
         self.inputs = build / "bench" / "inputs"
         self.rounds, self.n = rounds, n
         self.figures = Figures()
         self.all_hold = True
-        if not self.ours.exists():
-            raise SystemExit(f"error: {self.ours} is not built\n  mend: ninja -C {build} engram_bench")
+        for program in (self.ours, self.single):
+            if not program.exists():
+                raise SystemExit(f"error: {program} is not built\n  mend: ninja -C {build} {program.name}")
         build_peers(self.peers)
         export_models(self.inputs)
 
@@ -210,13 +238,18 @@ class Bench:
         trajectory = self.numbers(f"{name}_trajectory", xs, us)
         ours = run_json(self.ours, "compare", name, trajectory)
         holds = gate_problem(name, ours, run_json(peer_exe, model, "compare", name, trajectory))
-        self.all_hold &= holds
+        single_holds = gate_problem_single(name, run_json(self.single, "compare", name, trajectory), ours)
+        self.all_hold &= holds and single_holds
 
         n = max(20, self.n * 30 * 14 // (T * 2 * nv))  # fewer samples of what takes longer
-        mine, peer = alternate(self.rounds, [self.ours, "time", name, n], [peer_exe, model, "time", name, n])
+        mine, single, peer = alternate(
+            self.rounds, [self.ours, "time", name, n], [self.single, "time", name, n], [peer_exe, model, "time", name, n]
+        )
         self.figures.title(f"{name}: {T} knots, FDDP beside Crocoddyl 3.2.1 (wheel, SSE2), one thread")
         for phase in PHASES:
             self.figures.add(name, phase, mine[phase], peer[phase], holds, ours.get(f"flops_{phase}"))
+        for phase in PHASES:
+            self.figures.add(name, f"{phase}.float", single[phase], peer[phase], single_holds, ours.get(f"flops_{phase}"))
         print(f"  solve1 per knot: {mine['solve1'].median / T:.2f} us, peer {peer['solve1'].median / T:.2f} us")
         self.roofline(name, ours, mine)
 
@@ -249,16 +282,27 @@ class Bench:
         text = self.inputs / f"{robot}.txt"
         ours, theirs = run_json(self.ours, "compare", robot, file), run_json(peer_exe, text, "compare", file)
         holds = gate(robot, {name: difference(ours[name], theirs[name]) for name in theirs}, DERIVATIVE_TOLERANCE)
-        self.all_hold &= holds
+        single = run_json(self.single, "compare", robot, file)
+        single_holds = gate_rigid_body_single(robot, single, theirs, model.nv)
+        self.all_hold &= holds and single_holds
 
-        mine, peer = alternate(self.rounds, [self.ours, "time", robot, file, self.n], [peer_exe, text, "time", file, self.n])
-        self.figures.title(f"{robot}: beside Pinocchio 4.0 (own build, -march=native), one state after the other, then in lanes")
+        mine, single, peer = alternate(
+            self.rounds,
+            [self.ours, "time", robot, file, self.n],
+            [self.single, "time", robot, file, self.n],
+            [peer_exe, text, "time", file, self.n],
+        )
+        self.figures.title(
+            f"{robot}: beside Pinocchio 4.0 (own build, -march=native), one state after the other, in lanes, both in single"
+        )
         for name in RIGID_BODY:
             rivals = [peer[p] for p in (name, f"{name}_world") if p in peer]  # the convention that is faster here
             best = min(rivals, key=lambda s: s.median)
             flops = ours.get(f"flops_{name}")
             self.figures.add(robot, name, mine[name], best, holds, flops)
             self.figures.add(robot, f"{name}_lanes", mine[f"{name}_lanes"], best, holds, flops)
+            self.figures.add(robot, f"{name}.float", single[name], best, single_holds, flops)
+            self.figures.add(robot, f"{name}_lanes.float", single[f"{name}_lanes"], best, single_holds, flops)
 
     def queries(self) -> None:
         """The memory: its tables beside scikit-learn, and one whole query."""

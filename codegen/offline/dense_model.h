@@ -33,7 +33,7 @@ template <class P> void dense_dynamics(const typename P::LqModel& m, double dt, 
 }
 
 // Entry (i, j) of the Hessian in z = (dq, dv, du), without padding.
-template <class Layout, bool free_base> double dense_hessian(const KnotModel<Layout, free_base, double>& m, int i, int j) {
+template <class Layout, bool free_base> double dense_hessian(const KnotModel<Layout, free_base, Real>& m, int i, int j) {
   const int a = padded_index<Layout>(i), b = padded_index<Layout>(j);
   return m.Lzz[std::max(a, b)][std::min(a, b)];
 }

@@ -82,9 +82,9 @@ struct FddpStats {
 // The problem: start and the parameters of each knot. Knot n is the terminal one (dt = 0, no control).
 template <class P, int N> struct Horizon {
   int n = 0;                                  // knots with a control, 0 <= n <= N
-  double x0[P::nx];                           // measured or predicted state
+  Real x0[P::nx];                           // measured or predicted state
   unsigned phase[N + 1] = {};                  // what each knot is, for a problem with phases
-  typename P::template Knot<double> knot[N + 1];
+  typename P::template Knot<Real> knot[N + 1];
 
   unsigned phase_of(int k) const { return k == n ? kTerminalPhase : phase[k]; }
 };
@@ -106,9 +106,9 @@ template <class P, int N> FddpHorizonError fddp_check(const Horizon<P, N>& h) {
 
 template <class P, int N> struct FddpSolution {
   static constexpr int nxp = P::Layout::nxp;
-  double x[N + 1][P::nx];                 // states
-  double u[N][P::nu];                     // controls
-  alignas(64) double K[N][P::nu][nxp];    // gains: u = u_k - K_k (x (-) x_k), padded columns
+  Real x[N + 1][P::nx];                   // states
+  Real u[N][P::nu];                       // controls
+  alignas(64) Real K[N][P::nu][nxp];      // gains: u = u_k - K_k (x (-) x_k), padded columns
   double cost;                            // of (x, u)
 };
 
@@ -118,15 +118,15 @@ template <class P, int N> struct FddpWork {
   using Model = typename P::LqModel;
   // written by fddp_linearize
   Model model[N + 1];
-  alignas(64) double f[N + 1][L::nxp];    // gaps: f_0 = x0 (-) x_0, f_{k+1} = f_k(x_k, u_k) (-) x_{k+1}   (ndx)
+  alignas(64) Real f[N + 1][L::nxp];      // gaps: f_0 = x0 (-) x_0, f_{k+1} = f_k(x_k, u_k) (-) x_{k+1}   (ndx)
   double gap, largest_gap;                // their L1 and largest norm
   double cost;                            // of the trajectory linearized at
   // written by fddp_backward
-  alignas(64) double k[N][L::nup];        // feed-forward: u = u_k - alpha k - K dx                          (nu)
-  alignas(64) double Vf[N + 1][L::nxp];   // Vxx f                                                           (ndx)
+  alignas(64) Real k[N][L::nup];          // feed-forward: u = u_k - alpha k - K dx                          (nu)
+  alignas(64) Real Vf[N + 1][L::nxp];     // Vxx f                                                           (ndx)
   double gradient;                        // sum_k |Qu_k|^2
   double dg, dq;                          // first and second order of the expected improvement without the term of the rollout
-  alignas(64) double Vx0[L::nxp];         // value gradient, dg and dq at the first knot before its gap: what fddp_feedback
+  alignas(64) Real Vx0[L::nxp];           // value gradient, dg and dq at the first knot before its gap: what fddp_feedback
   double dg0, dq0;                        // starts from when the measured state moves that gap
   // written by fddp_rollout: one step length a lane
   Pack x_try[N + 1][P::nx];
@@ -137,11 +137,11 @@ template <class P, int N> struct FddpWork {
   // scratch
   typename P::Lanes lanes;
   typename P::Lanes* more_lanes = nullptr;  // the caller's, one for each thread beyond the first
-  alignas(64) double Q[L::nzp][L::nzp], Qz[L::nzp];
-  alignas(64) double Vxx[L::nxp][L::nxp], Vx[L::nxp];
-  alignas(64) double Vvq[P::nv][padded(P::nv)], Vvv[P::nv][padded(P::nv)], Vqq[P::nv][padded(P::nv)];
-  alignas(64) double W[P::nv][L::nzp], GV[6][L::nxp];
-  alignas(64) double Luu[L::nup][L::nup], Y[P::nu][L::nxp];
+  alignas(64) Real Q[L::nzp][L::nzp], Qz[L::nzp];
+  alignas(64) Real Vxx[L::nxp][L::nxp], Vx[L::nxp];
+  alignas(64) Real Vvq[P::nv][padded(P::nv)], Vvv[P::nv][padded(P::nv)], Vqq[P::nv][padded(P::nv)];
+  alignas(64) Real W[P::nv][L::nzp], GV[6][L::nxp];
+  alignas(64) Real Luu[L::nup][L::nup], Y[P::nu][L::nxp];
 };
 
 }  // namespace engram

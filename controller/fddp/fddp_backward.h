@@ -23,12 +23,12 @@ namespace engram {
 // pass through an identity.
 class BaseColumns {
  public:
-  explicit BaseColumns(const Mat<double, 6, 6>& T) {
+  explicit BaseColumns(const Mat<Real, 6, 6>& T) {
     for (int i = 0; i < kWidth; ++i)
       for (int j = 0; j < kWidth; ++j) T_[i][j] = i < 6 && j < 6 ? T(i, j) : i == j ? 1.0 : 0.0;
   }
   // row <- row T
-  void apply(double* row) const {
+  void apply(Real* row) const {
     kernel::Vector c[kWidth / kVector] = {};
     for (int k = 0; k < kWidth; ++k)
       for (int j = 0; j < kWidth / kVector; ++j) c[j] += row[k] * kernel::vec(T_[k] + j * kVector);
@@ -37,19 +37,19 @@ class BaseColumns {
 
  private:
   static constexpr int kWidth = 8;
-  alignas(64) double T_[kWidth][kWidth];
+  alignas(64) Real T_[kWidth][kWidth];
 };
 
 // out (6 rows of n, apart) = T' M for the first 6 rows of M.
-template <int n> inline void base_rows(const Mat<double, 6, 6>& T, const double* M, int ldm, double* out, int ldo) {
-  double columns[6][6];
+template <int n> inline void base_rows(const Mat<Real, 6, 6>& T, const Real* M, int ldm, Real* out, int ldo) {
+  Real columns[6][6];
   for (int k = 0; k < 6; ++k)
     for (int i = 0; i < 6; ++i) columns[k][i] = T(k, i);
   kernel::product<6, n, 6, kernel::Sign::kPlus, kernel::Start::kSet>(&columns[0][0], 6, M, ldm, out, ldo);
 }
 
 // The value function (w.Vxx, w.Vx) of the next knot in the coordinates (dq, dv'): fills w.Vqq (lower), w.Vvq, w.Vvv and changes w.Vx.
-template <class P, int N> void value_before_integrator(const typename FddpWork<P, N>::Model& m, double dt, FddpWork<P, N>& w) {
+template <class P, int N> void value_before_integrator(const typename FddpWork<P, N>::Model& m, Real dt, FddpWork<P, N>& w) {
   using L = typename P::Layout;
   constexpr int nv = P::nv, nvp = padded(nv), ov = L::ov, nxp = L::nxp;
   using kernel::vec;
@@ -57,13 +57,13 @@ template <class P, int N> void value_before_integrator(const typename FddpWork<P
     const BaseColumns E(m.E), G(m.G);
     base_rows<nxp>(m.G, &w.Vxx[0][0], nxp, &w.GV[0][0], nxp);  // G' (Vqq Vqv)
     for (int i = 0; i < nv; ++i) {
-      const double* const q = i < 6 ? w.GV[i] : w.Vxx[i];
-      double *const vq = w.Vvq[i], *const vv = w.Vvv[i];
+      const Real* const q = i < 6 ? w.GV[i] : w.Vxx[i];
+      Real *const vq = w.Vvq[i], *const vv = w.Vvv[i];
       for (int j = 0; j < nvp; j += kVector) {
         vec(vq + j) = vec(w.Vxx[ov + i] + j) + dt * vec(q + j);            // Vvq + dt G' Vqq
         vec(vv + j) = vec(w.Vxx[ov + i] + ov + j) + dt * vec(q + ov + j);  // Vvv + dt G' Vqv
       }
-      alignas(64) double head[8];  // + dt (dt G' Vqq + Vvq) G
+      alignas(64) Real head[8];  // + dt (dt G' Vqq + Vvq) G
       std::memcpy(head, vq, sizeof(head));
       G.apply(head);
       for (int j = 0; j < 8; j += kVector) vec(vv + j) += dt * vec(head + j);
@@ -73,7 +73,7 @@ template <class P, int N> void value_before_integrator(const typename FddpWork<P
     base_rows<nvp>(m.E, &w.Vxx[0][0], nxp, &w.Vqq[0][0], nvp);  // E' Vqq E
     for (int i = 6; i < nv; ++i) copy_row(w.Vqq[i], w.Vxx[i], nvp);
     for (int i = 0; i < nv; ++i) E.apply(w.Vqq[i]);
-    double g[6], e[6];
+    Real g[6], e[6];
     for (int i = 0; i < 6; ++i) {
       g[i] = e[i] = 0.0;
       for (int k = 0; k < 6; ++k) {
@@ -104,7 +104,7 @@ template <class P, int N> void action_value(const typename FddpWork<P, N>::Model
   kernel::product<nv, nzp, nv, Sign::kPlus, Start::kSet>(&w.Vvv[0][0], nvp, &m.D[0][0], nzp, &w.W[0][0], nzp);  // W = Vvv~ D
   for (int i = 0; i < nv; ++i)
     for (int j = 0; j < nvp; j += kVector) {
-      const kernel::Vector half = 0.5 * vec(w.W[i] + j);
+      const kernel::Vector half = Real(0.5) * vec(w.W[i] + j);
       vec(w.W[i] + j) += vec(w.Vvq[i] + j);  // W = Vvv~ D + [Vvq~ 0], for the rows v and u of Qzz
       vec(w.Vvq[i] + j) += half;             // 1/2 Vvv~ Dq + Vvq~, for its block qq
     }
@@ -133,27 +133,27 @@ template <class P, int N> void action_value(const typename FddpWork<P, N>::Model
 template <class P, int N> bool gains(int k, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s) {
   using L = typename P::Layout;
   constexpr int nu = P::nu, nxp = L::nxp, nup = L::nup, ou = L::ou;
-  double inv[nup];
-  double* const Qu = w.Qz + ou;
+  Real inv[nup];
+  Real* const Qu = w.Qz + ou;
   for (int i = 0; i < nu; ++i) {
     w.Q[ou + i][ou + i] += w.reg;
-    std::memcpy(w.Luu[i], w.Q[ou + i] + ou, nup * sizeof(double));
-    std::memcpy(w.Y[i], w.Q[ou + i], nxp * sizeof(double));
+    std::memcpy(w.Luu[i], w.Q[ou + i] + ou, nup * sizeof(Real));
+    std::memcpy(w.Y[i], w.Q[ou + i], nxp * sizeof(Real));
   }
-  double gain1 = 0.0, gain2 = 0.0;  // k' Qu and k' Quu k
+  Real gain1 = 0.0, gain2 = 0.0;  // k' Qu and k' Quu k
   for (int i = 0; i < nu; ++i) w.gradient += Qu[i] * Qu[i];
   if (opts.box) {
     if (!fddp_box(s.u[k], w, inv, w.k[k])) return false;
     for (int i = 0; i < nu; ++i) {
-      double Quuk = 0.0;
+      Real Quuk = 0.0;
       for (int j = 0; j < nu; ++j) Quuk += (j <= i ? w.Q[ou + i][ou + j] : w.Q[ou + j][ou + i]) * w.k[k][j];
       gain1 += w.k[k][i] * Qu[i];
       gain2 += w.k[k][i] * Quuk;
     }
   } else {
     if (!kernel::cholesky<nu>(&w.Luu[0][0], nup, inv)) return false;
-    double* const y = w.k[k];  // k = L^-T L^-1 Qu
-    std::memcpy(y, Qu, nup * sizeof(double));
+    Real* const y = w.k[k];  // k = L^-T L^-1 Qu
+    std::memcpy(y, Qu, nup * sizeof(Real));
     kernel::solve_lower_vector<nu>(&w.Luu[0][0], nup, inv, y);
     for (int i = 0; i < nu; ++i) gain1 += y[i] * y[i];
     gain2 = gain1;

@@ -16,27 +16,27 @@ namespace engram {
 
 inline constexpr int kBoxIterations = 20;   // a Newton step per change of the clamped set; nu changes are the usual worst case
 inline constexpr int kBoxStepLengths = 10;
-inline constexpr double kBoxArmijo = 0.1;
-inline constexpr double kBoxZero = 1e-12;   // free gradient, relative to the first one
+inline constexpr Real kBoxArmijo = 0.1;
+inline constexpr Real kBoxZero = 1e-12;     // free gradient, relative to the first one
 
 // Solves for k = -d at control u; leaves the factor of the clamped Quu in w.Luu and inv, and clears the clamped rows of w.Y.
 // False if the free part of Quu is not positive definite.
-template <class P, int N> bool fddp_box(const double* u, FddpWork<P, N>& w, double* inv, double* k) {
+template <class P, int N> bool fddp_box(const Real* u, FddpWork<P, N>& w, Real* inv, Real* k) {
   using L = typename P::Layout;
   constexpr int nu = P::nu, nup = L::nup, ou = L::ou;
   const auto H = [&](int i, int j) { return i >= j ? w.Q[ou + i][ou + j] : w.Q[ou + j][ou + i]; };
-  const double* const g = w.Qz + ou;
-  double lo[nu], hi[nu], d[nu], grad[nu], step[nu], trial[nu];
+  const Real* const g = w.Qz + ou;
+  Real lo[nu], hi[nu], d[nu], grad[nu], step[nu], trial[nu];
   bool clamped[nu];
   for (int i = 0; i < nu; ++i) {
     lo[i] = P::u_lo(i) - u[i];
     hi[i] = P::u_hi(i) - u[i];
     d[i] = lo[i] > 0.0 ? lo[i] : hi[i] < 0.0 ? hi[i] : 0.0;
   }
-  const auto value = [&](const double* p, double* gradient) {  // 1/2 p' H p + g' p, gradient H p + g
-    double v = 0.0;
+  const auto value = [&](const Real* p, Real* gradient) {      // 1/2 p' H p + g' p, gradient H p + g
+    Real v = 0.0;
     for (int i = 0; i < nu; ++i) {
-      double Hp = 0.0;
+      Real Hp = 0.0;
       for (int j = 0; j < nu; ++j) Hp += H(i, j) * p[j];
       v += (0.5 * Hp + g[i]) * p[i];
       if (gradient) gradient[i] = Hp + g[i];
@@ -44,9 +44,9 @@ template <class P, int N> bool fddp_box(const double* u, FddpWork<P, N>& w, doub
     return v;
   };
 
-  double v = value(d, grad), first = 0.0;
+  Real v = value(d, grad), first = 0.0;
   for (int iteration = 0;; ++iteration) {
-    double free_gradient = 0.0;
+    Real free_gradient = 0.0;
     for (int i = 0; i < nu; ++i) {
       clamped[i] = (d[i] <= lo[i] && grad[i] > 0.0) || (d[i] >= hi[i] && grad[i] < 0.0);
       if (!clamped[i]) free_gradient += grad[i] * grad[i];
@@ -66,12 +66,12 @@ template <class P, int N> bool fddp_box(const double* u, FddpWork<P, N>& w, doub
       for (int j = i + 1; j < nu; ++j) step[i] -= w.Luu[j][i] * step[j];
       step[i] *= inv[i];
     }
-    double alpha = 1.0;
+    Real alpha = 1.0;
     bool moved = false;
     for (int trial_count = 0; trial_count < kBoxStepLengths && !moved; ++trial_count, alpha *= 0.5) {
-      double slope = 0.0;
+      Real slope = 0.0;
       for (int i = 0; i < nu; ++i) {
-        const double t = d[i] + alpha * step[i];
+        const Real t = d[i] + alpha * step[i];
         trial[i] = t < lo[i] ? lo[i] : t > hi[i] ? hi[i] : t;
         slope += grad[i] * (trial[i] - d[i]);
       }

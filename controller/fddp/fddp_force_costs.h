@@ -25,7 +25,7 @@ template <class P, int N> void add_force_hessian(const typename FddpWork<P, N>::
 }
 
 // Q += T' T of coupled residuals: the first n rows and columns.
-template <int n, int ld, class Model> void add_coupled_hessian(const Model& m, double (*Q)[ld]) {
+template <int n, int ld, class Model> void add_coupled_hessian(const Model& m, Real (*Q)[ld]) {
   if constexpr (Model::nt > 0)
     if (m.coupled) kernel::product_lower<n, Model::nt>(m.T[0], Model::L::nzp, m.T[0], Model::L::nzp, Q[0], ld);
 }

@@ -12,16 +12,16 @@
 
 namespace engram::kernel {
 
-typedef double Vector __attribute__((vector_size(kVector * sizeof(double)), aligned(kVector * sizeof(double)), may_alias));
+typedef Real Vector __attribute__((vector_size(kVectorBytes), aligned(kVectorBytes), may_alias));
 
-inline Vector& vec(double* p) { return *reinterpret_cast<Vector*>(p); }
-inline const Vector& vec(const double* p) { return *reinterpret_cast<const Vector*>(p); }
+inline Vector& vec(Real* p) { return *reinterpret_cast<Vector*>(p); }
+inline const Vector& vec(const Real* p) { return *reinterpret_cast<const Vector*>(p); }
 
 enum class Sign { kPlus, kMinus };
 enum class Start { kAdd, kSet };  // C += ... or C = ...
 
 // Rows and vectors of a block of C, kept in registers over the whole sum: twelve and more hide the latency of the additions.
-inline constexpr int kBlockRows = 4, kBlockVectors = kVector == 8 ? 4 : 3;
+inline constexpr int kBlockRows = 4, kBlockVectors = kVectorBytes == 64 ? 4 : 3;
 
 // Keeps the compiler from gathering the factors of several rows before their products: a block of C, one row of B and one factor are
 // what sixteen registers hold.
@@ -34,7 +34,7 @@ inline __attribute__((always_inline)) void in_turn(Vector& c) {
 }
 
 template <int mr, int nr, int depth, Sign sign, Start start>
-inline __attribute__((always_inline)) void product_block(const double* A, int lda, const double* B, int ldb, double* C, int ldc) {
+inline __attribute__((always_inline)) void product_block(const Real* A, int lda, const Real* B, int ldb, Real* C, int ldc) {
   Vector c[mr][nr];
   for (int i = 0; i < mr; ++i)
     for (int j = 0; j < nr; ++j) c[i][j] = start == Start::kSet ? Vector{} : vec(C + i * ldc + j * kVector);
@@ -57,7 +57,7 @@ inline __attribute__((always_inline)) void product_block(const double* A, int ld
 // Rows first .. last of a panel of nr vectors: the panel of B stays in the first cache. first is a multiple of kBlockRows; rest is
 // last % kBlockRows.
 template <int nr, int rest, int depth, Sign sign, Start start>
-__attribute__((noinline)) void product_panel(int first, int last, const double* A, int lda, const double* B, int ldb, double* C, int ldc) {
+__attribute__((noinline)) void product_panel(int first, int last, const Real* A, int lda, const Real* B, int ldb, Real* C, int ldc) {
   int i = first;
   for (; i + kBlockRows <= last; i += kBlockRows) product_block<kBlockRows, nr, depth, sign, start>(A + i, lda, B, ldb, C + i * ldc, ldc);
   if constexpr (rest > 0)
@@ -72,7 +72,7 @@ constexpr int panel_width(int at, int nv) {
 
 // C (m x n) += sign A' B,  A (depth x m), B (depth x n); n a multiple of kVector.
 template <int m, int n, int depth, Sign sign = Sign::kPlus, Start start = Start::kAdd, int at = 0>
-inline void product(const double* A, int lda, const double* B, int ldb, double* C, int ldc) {
+inline void product(const Real* A, int lda, const Real* B, int ldb, Real* C, int ldc) {
   static_assert(n % kVector == 0);
   if constexpr (at < n / kVector) {
     constexpr int nr = panel_width(at, n / kVector), column = at * kVector;
@@ -83,7 +83,7 @@ inline void product(const double* A, int lda, const double* B, int ldb, double* 
 
 // The blocks of a panel that the diagonal cuts: `nr` vectors in the rows of vector nr of the panel.
 template <int m, int row, int at, int width, int depth, Sign sign, Start start, int nr = 1>
-inline void product_diagonal(const double* A, int lda, const double* B, int ldb, double* C, int ldc) {
+inline void product_diagonal(const Real* A, int lda, const Real* B, int ldb, Real* C, int ldc) {
   if constexpr (nr <= width) {
     constexpr int first = (at + nr - 1) * kVector, last = first + kVector < m ? first + kVector : m;
     if constexpr (first >= row && first < m)
@@ -94,7 +94,7 @@ inline void product_diagonal(const double* A, int lda, const double* B, int ldb,
 
 // Lower triangle of a symmetric C (m x m), from `row` (a multiple of kVector) on, += sign A' B, up to the vector of the diagonal.
 template <int m, int depth, Sign sign = Sign::kPlus, int row = 0, Start start = Start::kAdd, int at = 0>
-inline void product_lower(const double* A, int lda, const double* B, int ldb, double* C, int ldc) {
+inline void product_lower(const Real* A, int lda, const Real* B, int ldb, Real* C, int ldc) {
   static_assert(row % kVector == 0);
   constexpr int nv = padded(m) / kVector;
   if constexpr (at < nv) {
@@ -107,7 +107,7 @@ inline void product_lower(const double* A, int lda, const double* B, int ldb, do
 }
 
 // y (n) += sign A' x,  A (depth x n), n a multiple of kVector.
-template <int n, int depth, Sign sign = Sign::kPlus, int at = 0> inline void product_vector(const double* A, int lda, const double* x, double* y) {
+template <int n, int depth, Sign sign = Sign::kPlus, int at = 0> inline void product_vector(const Real* A, int lda, const Real* x, Real* y) {
   static_assert(n % kVector == 0);
   if constexpr (at < n) {
     constexpr int nr = (n - at) / kVector < 10 ? (n - at) / kVector : 10;
@@ -124,16 +124,16 @@ template <int n, int depth, Sign sign = Sign::kPlus, int at = 0> inline void pro
 }
 
 // y (n) = S x for symmetric S of which the full matrix is stored; n a multiple of kVector.
-template <int n> inline void symmetric_vector(const double* S, int lds, const double* x, double* y) {
+template <int n> inline void symmetric_vector(const Real* S, int lds, const Real* x, Real* y) {
   for (int j = 0; j < n; j += kVector) vec(y + j) = Vector{};
   product_vector<n, n>(S, lds, x, y);
 }
 
 // Copies the lower triangle of C (m x m) to the upper, in blocks of 4 x 4 that are turned in registers; m a multiple of 4.
-template <int m> inline void mirror_lower(double* C, int ldc) {
+template <int m> inline void mirror_lower(Real* C, int ldc) {
   static_assert(m % 4 == 0);
-  typedef double Four __attribute__((vector_size(32), aligned(32), may_alias));
-  typedef int64_t Pick __attribute__((vector_size(32)));
+  typedef Real Four __attribute__((vector_size(4 * sizeof(Real)), aligned(4 * sizeof(Real)), may_alias));
+  typedef Bits Pick __attribute__((vector_size(4 * sizeof(Real))));
   for (int i = 0; i < m; i += 4) {
     for (int j = 0; j < i; j += 4) {
       const Four* const r[4] = {reinterpret_cast<Four*>(C + i * ldc + j), reinterpret_cast<Four*>(C + (i + 1) * ldc + j),
@@ -151,18 +151,18 @@ template <int m> inline void mirror_lower(double* C, int ldc) {
 }
 
 // A = L L' in place (lower triangle of A (n x n)); inv_diagonal holds 1 / L(i, i). False if A is not positive definite.
-template <int n> inline bool cholesky(double* A, int lda, double* inv_diagonal) {
+template <int n> inline bool cholesky(Real* A, int lda, Real* inv_diagonal) {
   bool positive = true;
   for (int j = 0; j < n; ++j) {
-    double d = A[j * lda + j];
+    Real d = A[j * lda + j];
     for (int k = 0; k < j; ++k) d -= A[j * lda + k] * A[j * lda + k];
     positive &= d > 0.0;  // false for NaN too
-    const double l = std::sqrt(positive ? d : 1.0);
-    const double inv = 1.0 / l;
+    const Real l = std::sqrt(positive ? d : 1.0);
+    const Real inv = 1.0 / l;
     A[j * lda + j] = l;
     inv_diagonal[j] = inv;
     for (int i = j + 1; i < n; ++i) {
-      double s = A[i * lda + j];
+      Real s = A[i * lda + j];
       for (int k = 0; k < j; ++k) s -= A[i * lda + k] * A[j * lda + k];
       A[i * lda + j] = s * inv;
     }
@@ -172,7 +172,7 @@ template <int n> inline bool cholesky(double* A, int lda, double* inv_diagonal) 
 
 // Rows i .. i + mr of B <- L^-1 B, the rows before them done.
 template <int mr, int nr>
-inline __attribute__((always_inline)) void solve_lower_block(const double* L, int ldl, const double* inv_diagonal, int i, double* B, int ldb) {
+inline __attribute__((always_inline)) void solve_lower_block(const Real* L, int ldl, const Real* inv_diagonal, int i, Real* B, int ldb) {
   Vector c[mr][nr];
   for (int r = 0; r < mr; ++r)
     for (int j = 0; j < nr; ++j) c[r][j] = vec(B + (i + r) * ldb + j * kVector);
@@ -194,7 +194,7 @@ inline __attribute__((always_inline)) void solve_lower_block(const double* L, in
 
 // Rows i .. i + mr of B <- L'^-1 B, the rows after them, up to n, done.
 template <int mr, int nr, int n>
-inline __attribute__((always_inline)) void solve_lower_transposed_block(const double* L, int ldl, const double* inv_diagonal, int i, double* B,
+inline __attribute__((always_inline)) void solve_lower_transposed_block(const Real* L, int ldl, const Real* inv_diagonal, int i, Real* B,
                                                                         int ldb) {
   Vector c[mr][nr];
   for (int r = 0; r < mr; ++r)
@@ -216,11 +216,11 @@ inline __attribute__((always_inline)) void solve_lower_transposed_block(const do
 }
 
 // B <- L^-1 B (forward) for B (n x m), m a multiple of kVector.
-template <int n, int m, int block = 0> inline void solve_lower(const double* L, int ldl, const double* inv_diagonal, double* B, int ldb) {
+template <int n, int m, int block = 0> inline void solve_lower(const Real* L, int ldl, const Real* inv_diagonal, Real* B, int ldb) {
   constexpr int nv = m / kVector, blocks = (nv + kBlockVectors - 1) / kBlockVectors, whole = n / kBlockRows * kBlockRows;
   if constexpr (block < blocks) {
     constexpr int first = nv * block / blocks, nr = nv * (block + 1) / blocks - first;
-    double* const at = B + first * kVector;
+    Real* const at = B + first * kVector;
     for (int i = 0; i < whole; i += kBlockRows) solve_lower_block<kBlockRows, nr>(L, ldl, inv_diagonal, i, at, ldb);
     if constexpr (whole < n) solve_lower_block<n - whole, nr>(L, ldl, inv_diagonal, whole, at, ldb);
     solve_lower<n, m, block + 1>(L, ldl, inv_diagonal, B, ldb);
@@ -229,11 +229,11 @@ template <int n, int m, int block = 0> inline void solve_lower(const double* L, 
 
 // B <- L'^-1 B (backward) for B (n x m), m a multiple of kVector.
 template <int n, int m, int block = 0>
-inline void solve_lower_transposed(const double* L, int ldl, const double* inv_diagonal, double* B, int ldb) {
+inline void solve_lower_transposed(const Real* L, int ldl, const Real* inv_diagonal, Real* B, int ldb) {
   constexpr int nv = m / kVector, blocks = (nv + kBlockVectors - 1) / kBlockVectors, whole = n / kBlockRows * kBlockRows;
   if constexpr (block < blocks) {
     constexpr int first = nv * block / blocks, nr = nv * (block + 1) / blocks - first;
-    double* const at = B + first * kVector;
+    Real* const at = B + first * kVector;
     if constexpr (whole < n) solve_lower_transposed_block<n - whole, nr, n>(L, ldl, inv_diagonal, whole, at, ldb);
     for (int i = whole - kBlockRows; i >= 0; i -= kBlockRows)
       solve_lower_transposed_block<kBlockRows, nr, n>(L, ldl, inv_diagonal, i, at, ldb);
@@ -242,24 +242,24 @@ inline void solve_lower_transposed(const double* L, int ldl, const double* inv_d
 }
 
 // Sum of the entries.
-inline double sum(Vector v) {
-  double s = 0.0;
+inline Real sum(Vector v) {
+  Real s = 0.0;
   for (int i = 0; i < kVector; ++i) s += v[i];
   return s;
 }
 
 // y <- L^-1 y (forward) and L'^-1 y (backward) for y (n), padded with zeros; rows of L are padded with finite numbers.
-template <int n> inline void solve_lower_vector(const double* L, int ldl, const double* inv_diagonal, double* y) {
+template <int n> inline void solve_lower_vector(const Real* L, int ldl, const Real* inv_diagonal, Real* y) {
   for (int i = 0; i < n; ++i) {
     Vector s = {};
     int k = 0;
     for (; k + kVector <= i; k += kVector) s += vec(L + i * ldl + k) * vec(y + k);
-    double t = y[i] - sum(s);
+    Real t = y[i] - sum(s);
     for (; k < i; ++k) t -= L[i * ldl + k] * y[k];
     y[i] = t * inv_diagonal[i];
   }
 }
-template <int n> inline void solve_lower_transposed_vector(const double* L, int ldl, const double* inv_diagonal, double* y) {
+template <int n> inline void solve_lower_transposed_vector(const Real* L, int ldl, const Real* inv_diagonal, Real* y) {
   for (int i = n - 1; i >= 0; --i) {
     y[i] *= inv_diagonal[i];
     for (int k = 0; k < i; ++k) y[k] -= L[i * ldl + k] * y[i];

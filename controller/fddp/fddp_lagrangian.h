@@ -35,7 +35,7 @@ struct LagrangianStats {
 
 // Calls f(i, parameters, residual) for every row that holds a constraint: penalty > 0.
 template <class P, int N, class F> void for_constraints(Horizon<P, N>& h, const FddpSolution<P, N>& s, F f) {
-  const double none[P::nu] = {};
+  const Real none[P::nu] = {};
   for (int k = 0; k <= h.n; ++k)
     P::visit_constraints(h.knot[k], s.x[k], k < h.n ? s.u[k] : none, [&](auto& p, const auto& r) {
       for (int i = 0; i < int(sizeof(r) / sizeof(r[0])); ++i)

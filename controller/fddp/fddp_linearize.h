@@ -47,8 +47,8 @@ template <class P, int N, class F> void for_lanes_of_knots(const Horizon<P, N>& 
 
 // n doubles of each of kLanes records -> n packs.
 template <class Record> inline void gather(const Record* records, const KnotLanes& knots, int n, Pack* out) {
-  const double* from[kLanes];
-  for (int i = 0; i < kLanes; ++i) from[i] = reinterpret_cast<const double*>(&records[knots.index[i]]);
+  const Real* from[kLanes];
+  for (int i = 0; i < kLanes; ++i) from[i] = reinterpret_cast<const Real*>(&records[knots.index[i]]);
   for (int e = 0; e < n; ++e) {
     Pack p = 0.0;
     for (int i = 0; i < kLanes; ++i) p.l[i] = from[i][e];
@@ -57,14 +57,14 @@ template <class Record> inline void gather(const Record* records, const KnotLane
 }
 
 // n packs -> n doubles of each of the lanes' records.
-inline void scatter(const Pack* in, int n, double* const* to) {
+inline void scatter(const Pack* in, int n, Real* const* to) {
   for (int e = 0; e < n; ++e)
     for (int i = 0; i < kLanes; ++i) to[i][e] = in[e].l[i];
 }
 
 template <class P, int N> void fddp_scatter_models(const typename P::Lanes& lanes, FddpWork<P, N>& w, const KnotLanes& knots) {
   using L = typename P::Layout;
-  double* to[kLanes];
+  Real* to[kLanes];
   const auto block = [&](auto member, const Pack* in, int n) {
     for (int i = 0; i < kLanes; ++i) to[i] = member(w.model[knots.index[i]]);
     scatter(in, n, to);
@@ -80,10 +80,10 @@ template <class P, int N> void fddp_scatter_models(const typename P::Lanes& lane
 
 // Models, costs (one a knot) and gaps of the knots `here`, in the scratch of one thread.
 template <class P, int N>
-void fddp_linearize_lanes(const Horizon<P, N>& h, const FddpSolution<P, N>& s, const KnotLanes& here, typename P::Lanes& lanes, double* costs,
+void fddp_linearize_lanes(const Horizon<P, N>& h, const FddpSolution<P, N>& s, const KnotLanes& here, typename P::Lanes& lanes, Real* costs,
                           FddpWork<P, N>& w) {
   using L = typename P::Layout;
-  constexpr int knot_size = sizeof(typename P::template Knot<double>) / sizeof(double);
+  constexpr int knot_size = sizeof(typename P::template Knot<Real>) / sizeof(Real);
   typename P::template Knot<Pack> knot;
   static_assert(sizeof(knot) == knot_size * sizeof(Pack), "a Knot holds scalars only");
   Pack x[P::nx], u[P::nu], x_next[P::nx], x_there[P::nx], cost, f[L::nxp];
@@ -122,7 +122,7 @@ bool fddp_linearize(const Horizon<P, N>& h, const FddpSolution<P, N>& s, FddpWor
     FddpWork<P, N>& w;
     int threads, blocks = 0;
     KnotLanes block[N + 1];
-    double costs[N + 1];
+    Real costs[N + 1];
 
     // Each thread takes every threads-th block; none writes what another one reads.
     static void run(void* job, int thread) {
@@ -144,11 +144,11 @@ bool fddp_linearize(const Horizon<P, N>& h, const FddpSolution<P, N>& s, FddpWor
     for (int k = 0; k <= h.n; ++k)
       for (int e = 0; e < L::nxp; ++e) w.f[k][e] = 0.0;
 
-  double largest = 0.0;
+  Real largest = 0.0;
   w.gap = 0.0;
   for (int k = 0; k <= h.n; ++k)
     for (int e = 0; e < L::nxp; ++e) {
-      const double a = std::fabs(w.f[k][e]);
+      const Real a = std::fabs(w.f[k][e]);
       w.gap += a;
       largest = a > largest ? a : largest;
     }

@@ -32,7 +32,7 @@ Pack fddp_rollout(const Horizon<P, N>& h, const FddpOpts& opts, const FddpSoluti
     if (!w.feasible)
       for (int i = 0; i < L::nxp; ++i) dv += Pack(w.Vf[k][i]) * dx[i];
 
-    const double* const p = reinterpret_cast<const double*>(&h.knot[k]);
+    const Real* const p = reinterpret_cast<const Real*>(&h.knot[k]);
     for (int e = 0; e < knot_size; ++e) reinterpret_cast<Pack*>(&knot)[e] = p[e];
     if (k < h.n) {
       for (int i = 0; i < P::nu; ++i) {

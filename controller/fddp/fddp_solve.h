@@ -131,9 +131,9 @@ FddpStatus fddp_prepare(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P
 // After the state: h.x0 is now the measured one; rolls out along the prepared direction. True if s was improved.
 template <class P, int N>
 bool fddp_feedback(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s, FddpStats& stats) {
-  for (double f : w.f[0]) w.gap -= std::fabs(f);
+  for (Real f : w.f[0]) w.gap -= std::fabs(f);
   P::difference(s.x[0], h.x0, w.f[0]);
-  for (double f : w.f[0]) w.gap += std::fabs(f);
+  for (Real f : w.f[0]) w.gap += std::fabs(f);
   w.feasible = false;
   std::memcpy(w.Vx, w.Vx0, sizeof(w.Vx));
   w.dg = w.dg0;

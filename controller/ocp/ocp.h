@@ -27,15 +27,15 @@ template <class R_, class... Terms> struct Ocp {
   static constexpr bool kNeedsGravity = (Terms::kNeedsGravity || ...);
   static constexpr int nq = R::nq, nv = R::nv, nx = nq + nv, ndx = 2 * nv, nu = R::nu, nz = ndx + nu;
   template <class S> using Model = ModelOf<R, S>;
-  using LqModel = Model<double>;
+  using LqModel = Model<Real>;
   using Lanes = Model<Pack>;
   static constexpr bool kPhases = false;  // all knots are of one kind
   template <class S> struct Knot : Terms::template Param<S>... {
     S dt;  // time step [s]; 0 at the terminal knot
   };
 
-  static constexpr double u_lo(int i) { return ControlBounds<R>::lo(i); }
-  static constexpr double u_hi(int i) { return ControlBounds<R>::hi(i); }
+  static constexpr Real u_lo(int i) { return ControlBounds<R>::lo(i); }
+  static constexpr Real u_hi(int i) { return ControlBounds<R>::hi(i); }
 
   // x_next = x (+) dx, dx padded
   template <class S> static void integrate(const S* x, const S* dx, S* x_next) {
@@ -51,8 +51,8 @@ template <class R_, class... Terms> struct Ocp {
   }
 
   // Calls f(parameters, residual) for each constraint of a knot.
-  template <class F> static void visit_constraints(Knot<double>& knot, const double* x, const double* u, F f) {
-    engram::visit_constraints<R, Knot<double>, F, Terms...>(knot, x, u, f);
+  template <class F> static void visit_constraints(Knot<Real>& knot, const Real* x, const Real* u, F f) {
+    engram::visit_constraints<R, Knot<Real>, F, Terms...>(knot, x, u, f);
   }
 
   // Next state and cost of a knot.

@@ -18,7 +18,7 @@ template <class System_> struct AnalyticOcp {
   static constexpr int nq = System::n, nv = System::n, nx = 2 * nv, ndx = 2 * nv, nu = System::nu, nz = ndx + nu;
   using Layout = KnotLayout<nv, nu>;
   template <class S> using Model = KnotModel<Layout, false, S>;
-  using LqModel = Model<double>;
+  using LqModel = Model<Real>;
   using Lanes = Model<Pack>;
   static constexpr bool kPhases = false, kFreeBase = false;
   template <class S> struct Knot {
@@ -27,8 +27,8 @@ template <class System_> struct AnalyticOcp {
     S dt;  // time step [s]; 0 at the terminal knot
   };
 
-  static constexpr double u_lo(int i) { return System::u_lo[i]; }
-  static constexpr double u_hi(int i) { return System::u_hi[i]; }
+  static constexpr Real u_lo(int i) { return System::u_lo[i]; }
+  static constexpr Real u_hi(int i) { return System::u_hi[i]; }
 
   // x_next = x + dx, dx padded
   template <class S> static void integrate(const S* x, const S* dx, S* x_next) {

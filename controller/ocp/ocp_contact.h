@@ -49,8 +49,8 @@ template <class C, class... Terms> struct ContactOcp {
     S dt;  // time step [s]; 0 at an impact and at the terminal knot
   };
 
-  static constexpr double u_lo(int i) { return ControlBounds<R>::lo(i); }
-  static constexpr double u_hi(int i) { return ControlBounds<R>::hi(i); }
+  static constexpr Real u_lo(int i) { return ControlBounds<R>::lo(i); }
+  static constexpr Real u_hi(int i) { return ControlBounds<R>::hi(i); }
 
   // x_next = x (+) dx, dx padded
   template <class S> static void integrate(const S* x, const S* dx, S* x_next) {
@@ -66,8 +66,8 @@ template <class C, class... Terms> struct ContactOcp {
   }
 
   // Calls f(parameters, residual) for each constraint of a knot.
-  template <class F> static void visit_constraints(Knot<double>& knot, const double* x, const double* u, F f) {
-    engram::visit_constraints<R, Knot<double>, F, Terms...>(knot, x, u, f);
+  template <class F> static void visit_constraints(Knot<Real>& knot, const Real* x, const Real* u, F f) {
+    engram::visit_constraints<R, Knot<Real>, F, Terms...>(knot, x, u, f);
   }
 
   // Next state and cost of a knot.
@@ -122,7 +122,7 @@ template <class C, class... Terms> struct ContactOcp {
   }
 
   // The model of the knot in one lane.
-  static void finish(unsigned phase, double dt, const Lanes& w, int lane, LqModel& m) {
+  static void finish(unsigned phase, Real dt, const Lanes& w, int lane, LqModel& m) {
     if (phase == kTerminalPhase) return contact_finish_costs(w, lane, 0, m);
     const unsigned active = phase & ~kImpact;
     contact_finish_dynamics(w, lane, active, phase & kImpact ? 1.0 : dt, m);

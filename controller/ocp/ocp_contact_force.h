@@ -51,7 +51,7 @@ template <int contact> struct FrictionConeTerm {
   }
   template <class S, class F> static void visit(const Param<S>& p, F f) {
     for (int axis = 0; axis < 2; ++axis)
-      for (double sign : {1.0, -1.0}) {
+      for (Real sign : {1.0, -1.0}) {
         S a[3] = {0.0, 0.0, -p.friction_mu};
         a[axis] = sign;
         f(a);
@@ -84,7 +84,7 @@ template <int contact> struct WrenchConeTerm {
       f(row);
     };
     for (int axis = 0; axis < 2; ++axis)
-      for (double sign : {1.0, -1.0}) {
+      for (Real sign : {1.0, -1.0}) {
         S a[6] = {0.0, 0.0, -mu, 0.0, 0.0, 0.0};
         a[axis] = sign;
         turned(a);
@@ -92,14 +92,14 @@ template <int contact> struct WrenchConeTerm {
     const S normal[6] = {0.0, 0.0, -1.0, 0.0, 0.0, 0.0};
     f(normal);
     for (int axis = 0; axis < 2; ++axis)
-      for (double sign : {1.0, -1.0}) {
+      for (Real sign : {1.0, -1.0}) {
         S a[6] = {0.0, 0.0, axis == 0 ? -Y : -X, 0.0, 0.0, 0.0};
         a[3 + axis] = sign;
         turned(a);
       }
-    for (double yaw : {-1.0, 1.0})
-      for (double sx : {1.0, -1.0})
-        for (double sy : {1.0, -1.0}) {
+    for (Real yaw : {-1.0, 1.0})
+      for (Real sx : {1.0, -1.0})
+        for (Real sy : {1.0, -1.0}) {
           const S a[6] = {sx * Y, sy * X, -mu * (X + Y), yaw * sx * mu, yaw * sy * mu, yaw};
           turned(a);
         }
@@ -120,7 +120,7 @@ template <int contact> struct CopTerm {
   }
   template <class S, class F> static void visit(const Param<S>& p, F f) {
     for (int axis = 0; axis < 2; ++axis)
-      for (double sign : {1.0, -1.0}) {
+      for (Real sign : {1.0, -1.0}) {
         S a[6] = {0.0, 0.0, -p.cop_half[1 - axis], 0.0, 0.0, 0.0};
         a[3 + axis] = sign;
         f(a);

@@ -22,27 +22,27 @@ namespace engram {
 
 // Rows of coupled residuals, times the root of their weights; nothing if there are none.
 template <class L, int nt> struct CoupledModel {
-  alignas(64) double T[nt][L::nzp];
+  alignas(64) Real T[nt][L::nzp];
   bool coupled;  // false: all rows are zero
 };
 template <class L> struct CoupledModel<L, 0> {};
 
 template <class C, int nt_ = 0>
-struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Robot>, double>, CoupledModel<LayoutOf<typename C::Robot>, nt_> {
+struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Robot>, Real>, CoupledModel<LayoutOf<typename C::Robot>, nt_> {
   using R = typename C::Robot;
   using L = LayoutOf<R>;
   static constexpr int nf = kContactRows<C>, nt = nt_;
-  alignas(64) double D[R::nv][L::nzp];             // d v' / d z                              (nv x nz)
-  alignas(64) double F[nf][L::nzp];                // d lambda / d z, rows of active contacts, axes of the set (nf x nz)
-  alignas(64) double Lz[L::nzp];                   // d l / d z                               (nz)
-  alignas(64) double Hqq[R::nv][padded(R::nv)];    // lower triangle
-  alignas(64) double h[L::nzp];                    // diagonal
-  double H[C::n][6][6];                            // Hessian of the force costs of each contact
+  alignas(64) Real D[R::nv][L::nzp];               // d v' / d z                              (nv x nz)
+  alignas(64) Real F[nf][L::nzp];                  // d lambda / d z, rows of active contacts, axes of the set (nf x nz)
+  alignas(64) Real Lz[L::nzp];                     // d l / d z                               (nz)
+  alignas(64) Real Hqq[R::nv][padded(R::nv)];      // lower triangle
+  alignas(64) Real h[L::nzp];                      // diagonal
+  Real H[C::n][6][6];                              // Hessian of the force costs of each contact
   unsigned forces;                                 // contacts whose H is not zero: bit c for contact c
 
   // Entry i >= j of the Hessian, padded indices: for tests and comparisons.
-  double hessian(int i, int j) const {
-    double s = (i < R::nv && j < R::nv ? Hqq[i][j] : 0.0) + (i == j ? h[i] : 0.0);
+  Real hessian(int i, int j) const {
+    Real s = (i < R::nv && j < R::nv ? Hqq[i][j] : 0.0) + (i == j ? h[i] : 0.0);
     for (int c = 0; c < C::n; ++c) {
       if (!contact_active(forces, c)) continue;
       const int first = kContactTree<C>.first[c], rows = kContactTree<C>.rows[c];
@@ -56,14 +56,14 @@ struct ContactKnotModel : BaseBlock<kFreeBase<typename C::Robot>, double>, Coupl
 };
 
 // The stored Hessian, as for a knot without contacts: block qq, and all blocks of the state.
-template <class C, int nt, int ld> inline void copy_hessian_qq(const ContactKnotModel<C, nt>& m, double (*to)[ld]) {
+template <class C, int nt, int ld> inline void copy_hessian_qq(const ContactKnotModel<C, nt>& m, Real (*to)[ld]) {
   for (int i = 0; i < C::Robot::nv; ++i) copy_row(to[i], m.Hqq[i], padded(i + 1));
 }
-template <class C, int nt, int ld> inline void copy_hessian_x(const ContactKnotModel<C, nt>& m, double (*to)[ld]) {
+template <class C, int nt, int ld> inline void copy_hessian_x(const ContactKnotModel<C, nt>& m, Real (*to)[ld]) {
   constexpr int nv = C::Robot::nv;
   copy_hessian_qq(m, to);
   for (int i = nv; i < LayoutOf<typename C::Robot>::nxp; ++i) {
-    std::memset(to[i], 0, padded(i + 1) * sizeof(double));
+    std::memset(to[i], 0, padded(i + 1) * sizeof(Real));
     to[i][i] = m.h[i];
   }
 }
@@ -102,7 +102,7 @@ inline void contact_finish_forces(const ContactData<C, Pack>& cd, int lane, unsi
     if constexpr (kContactAxes<C> == Axes::kLocal) {
       for (int part = first; part < tree.first[c + 1]; part += 3)
         for (int z = 0; z < L::nzp; ++z) {
-          const double f[3] = {m.F[part][z], m.F[part + 1][z], m.F[part + 2][z]};
+          const Real f[3] = {m.F[part][z], m.F[part + 1][z], m.F[part + 2][z]};
           for (int i = 0; i < 3; ++i)
             m.F[part + i][z] = cd.R_WF[c](0, i).l[lane] * f[0] + cd.R_WF[c](1, i).l[lane] * f[1] + cd.R_WF[c](2, i).l[lane] * f[2];
         }
@@ -130,7 +130,7 @@ inline void contact_finish_rows(const ContactLanes<C, nt, Pack>& in, int lane, u
   m.coupled = false;
   for (int t = 0; t < nt; ++t) {
     const auto& row = in.row[t];
-    const double w = std::sqrt(row.w.l[lane]);
+    const Real w = std::sqrt(row.w.l[lane]);
     std::memset(m.T[t], 0, sizeof(m.T[t]));
     if (w == 0.0) continue;
     m.coupled = true;
@@ -138,11 +138,11 @@ inline void contact_finish_rows(const ContactLanes<C, nt, Pack>& in, int lane, u
       m.T[t][L::oq + k] = row.q[k].l[lane];
       m.T[t][L::ov + k] = row.v[k].l[lane];
     }
-    double coefficient[nf] = {};
-    const double* from[nf] = {};
+    Real coefficient[nf] = {};
+    const Real* from[nf] = {};
     int n = 0;
     for (int r = 0; r < rows.n; ++r) {
-      const double a = row.lambda[rows.row[r]].l[lane];
+      const Real a = row.lambda[rows.row[r]].l[lane];
       if (a == 0.0) continue;
       coefficient[n] = a;
       from[n++] = m.F[rows.row[r]];
@@ -154,19 +154,19 @@ inline void contact_finish_rows(const ContactLanes<C, nt, Pack>& in, int lane, u
 
 // Fills D, F, E and G of the model of one lane. step: dt of a knot in time, 1 of an impact.
 template <class C, int nt>
-inline void contact_finish_dynamics(const ContactLanes<C, nt, Pack>& in, int lane, unsigned active, double step, ContactKnotModel<C, nt>& m) {
+inline void contact_finish_dynamics(const ContactLanes<C, nt, Pack>& in, int lane, unsigned active, Real step, ContactKnotModel<C, nt>& m) {
   using R = typename C::Robot;
   using L = LayoutOf<R>;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
   constexpr int nv = R::nv, nu = R::nu, nzp = L::nzp, nf = kContactRows<C>;
   const ActiveRows<C> rows(active);
-  double coefficient[nf + nv] = {};
-  const double* row[nf + nv] = {};
+  Real coefficient[nf + nv] = {};
+  const Real* row[nf + nv] = {};
 
   // F = G^-1 B
   for (int I = 0; I < rows.n; ++I) {
     const int r = rows.row[I];
-    double* const f = m.F[r];
+    Real* const f = m.F[r];
     std::memset(f, 0, sizeof(m.F[r]));
     for (int k = 0; k < nv; ++k) f[L::oq + k] = in.x.Bq[r][k].l[lane];
     for (int k = 0; k < nv; ++k) f[L::ov + k] = in.x.Bv[r][k].l[lane];
@@ -188,9 +188,9 @@ inline void contact_finish_dynamics(const ContactLanes<C, nt, Pack>& in, int lan
 
   // step L^-1 (U F - D^-1 X), row by row from the root
   for (int k = 0; k < nv; ++k) {
-    double* const out = m.D[k];
+    Real* const out = m.D[k];
     std::memset(out, 0, sizeof(m.D[k]));
-    const double scale = -step * in.d.D_inv[k].l[lane];
+    const Real scale = -step * in.d.D_inv[k].l[lane];
     const auto copy = [&](int j) {
       out[L::oq + j] = scale * in.x.Xq(k, j).l[lane];
       out[L::ov + j] = scale * in.x.Xv(k, j).l[lane];
@@ -240,15 +240,15 @@ inline void contact_finish_costs(const ContactLanes<C, nt, Pack>& in, int lane, 
   m.forces = 0;
   for (int c = 0; c < C::n; ++c) {
     if (!contact_active(active, c)) continue;
-    double largest = 0.0;
+    Real largest = 0.0;
     for (int r = 0; r < tree.rows[c]; ++r)
       for (int t = 0; t < tree.rows[c]; ++t) {
         m.H[c][r][t] = in.H[c][r][t].l[lane];
         largest += std::fabs(m.H[c][r][t]);
       }
     if (!(largest == 0.0)) m.forces |= 1u << c;
-    double coefficient[6] = {};
-    const double* row[6] = {};
+    Real coefficient[6] = {};
+    const Real* row[6] = {};
     for (int r = 0; r < tree.rows[c]; ++r) {
       coefficient[r] = in.g[tree.first[c] + r].l[lane];
       row[r] = m.F[tree.first[c] + r];

@@ -11,7 +11,7 @@ template <class S, int n> struct Dual {
   S d[n];
 
   Dual() = default;
-  Dual(double constant) : value(constant) {  // NOLINT: a constant is a dual
+  Dual(Real constant) : value(constant) {  // NOLINT: a constant is a dual
     for (S& x : d) x = 0.0;
   }
   // Variable number i.

@@ -17,10 +17,11 @@
 namespace engram {
 
 #ifdef __AVX512F__
-inline constexpr int kVector = 8;  // doubles in a register of the dense kernels
+inline constexpr int kVectorBytes = 64;  // a register of the dense kernels
 #else
-inline constexpr int kVector = 4;
+inline constexpr int kVectorBytes = 32;
 #endif
+inline constexpr int kVector = kVectorBytes / sizeof(Real);
 constexpr int padded(int n) { return (n + kVector - 1) / kVector * kVector; }
 
 // The phase of the terminal knot, in problems with phases.
@@ -53,8 +54,8 @@ template <class Layout, bool free_base, class S> struct KnotModel : BaseBlock<fr
 
 // n doubles, a multiple of kVector, between vector boundaries. Rows are short: the processor's block copy, which the compiler makes of
 // memcpy and of a plain loop, takes longer to start than they take.
-inline void copy_row(double* to, const double* from, int n) {
-  typedef double Vector __attribute__((vector_size(kVector * sizeof(double)), aligned(kVector * sizeof(double)), may_alias));
+inline void copy_row(Real* to, const Real* from, int n) {
+  typedef Real Vector __attribute__((vector_size(kVectorBytes), aligned(kVectorBytes), may_alias));
   for (int j = 0; j < n; j += kVector) {
     Vector v = *reinterpret_cast<const Vector*>(from + j);
 #ifdef __x86_64__
@@ -65,10 +66,10 @@ inline void copy_row(double* to, const double* from, int n) {
 }
 
 // Block qq of a knot's Hessian, lower triangle up to the padding, into rows of ld; all blocks of the state likewise.
-template <class Layout, bool free_base, int ld> inline void copy_hessian_qq(const KnotModel<Layout, free_base, double>& m, double (*to)[ld]) {
+template <class Layout, bool free_base, int ld> inline void copy_hessian_qq(const KnotModel<Layout, free_base, Real>& m, Real (*to)[ld]) {
   for (int i = 0; i < Layout::nv; ++i) copy_row(to[i], m.Lzz[i], padded(i + 1));
 }
-template <class Layout, bool free_base, int ld> inline void copy_hessian_x(const KnotModel<Layout, free_base, double>& m, double (*to)[ld]) {
+template <class Layout, bool free_base, int ld> inline void copy_hessian_x(const KnotModel<Layout, free_base, Real>& m, Real (*to)[ld]) {
   for (int i = 0; i < Layout::nxp; ++i) copy_row(to[i], m.Lzz[i], padded(i + 1));
 }
 // True for a model whose stored Hessian is block qq and a diagonal.

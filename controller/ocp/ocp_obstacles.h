@@ -47,7 +47,7 @@ template <class G> struct GridField {
   template <class S> static S distance(int, const Vec3<S>& p, Vec3<S>& gradient) {
     S d = 0.0;
     for (int l = 0; l < lanes_of<S>; ++l) {  // a gather: lane by lane
-      double at[3] = {lane(p[0], l), lane(p[1], l), lane(p[2], l)}, g[3];
+      Real at[3] = {lane(p[0], l), lane(p[1], l), lane(p[2], l)}, g[3];
       set_lane(d, l, trilinear(at, g));
       for (int k = 0; k < 3; ++k) set_lane(gradient[k], l, g[k]);
     }
@@ -55,26 +55,26 @@ template <class G> struct GridField {
   }
 
  private:
-  static double trilinear(const double (&p)[3], double (&g)[3]) {
+  static Real trilinear(const Real (&p)[3], Real (&g)[3]) {
     constexpr int n[3] = {G::nx, G::ny, G::nz};
     int i[3];
-    double t[3];
+    Real t[3];
     for (int k = 0; k < 3; ++k) {
-      double c = (p[k] - G::origin[k]) / G::cell;
+      Real c = (p[k] - G::origin[k]) / G::cell;
       c = c >= 0.0 ? c : 0.0;  // also for NaN
       c = c < n[k] - 1 ? c : n[k] - 1;
       i[k] = c < n[k] - 2 ? static_cast<int>(c) : n[k] - 2;
       t[k] = c - i[k];
     }
     const auto node = [&](int a, int b, int c) {
-      return static_cast<double>(G::sdf[(i[0] + a) + G::nx * ((i[1] + b) + G::ny * (i[2] + c))]);
+      return static_cast<Real>(G::sdf[(i[0] + a) + G::nx * ((i[1] + b) + G::ny * (i[2] + c))]);
     };
-    double d = 0.0;
+    Real d = 0.0;
     g[0] = g[1] = g[2] = 0.0;
     for (int c = 0; c < 2; ++c)
       for (int b = 0; b < 2; ++b)
         for (int a = 0; a < 2; ++a) {
-          const double wx = a ? t[0] : 1 - t[0], wy = b ? t[1] : 1 - t[1], wz = c ? t[2] : 1 - t[2], v = node(a, b, c);
+          const Real wx = a ? t[0] : 1 - t[0], wy = b ? t[1] : 1 - t[1], wz = c ? t[2] : 1 - t[2], v = node(a, b, c);
           d += wx * wy * wz * v;
           g[0] += (a ? 1 : -1) * wy * wz * v / G::cell;
           g[1] += (b ? 1 : -1) * wx * wz * v / G::cell;

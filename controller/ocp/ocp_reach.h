@@ -23,29 +23,29 @@ using Reach = Ocp<typename T::Robot, FramePoseTerm<typename T::Robot, T::frame>,
 
 // Where the hand shall be: p_WT [m] and R_WT (row-major).
 struct ReachTarget {
-  double p[3];
-  double R[9];
+  Real p[3];
+  Real R[9];
 };
 
 // task = (p_WT, quaternion x y z w); false if an entry is not finite or the quaternion is zero.
-inline bool reach_target(const double* task, ReachTarget& target) {
-  double norm2 = 0.0;
+inline bool reach_target(const Real* task, ReachTarget& target) {
+  Real norm2 = 0.0;
   for (int i = 3; i < 7; ++i) norm2 += task[i] * task[i];
-  const double norm = std::sqrt(norm2);
+  const Real norm = std::sqrt(norm2);
   if (!(norm > 1e-6) || !std::isfinite(norm + task[0] + task[1] + task[2])) return false;
-  double quat[4];
+  Real quat[4];
   for (int i = 0; i < 4; ++i) quat[i] = task[3 + i] / norm;
-  const Mat3<double> R = rotation_of(quat);
+  const Mat3<Real> R = rotation_of(quat);
   for (int i = 0; i < 3; ++i) target.p[i] = task[i];
   for (int i = 0; i < 9; ++i) target.R[i] = R(i / 3, i % 3);
   return true;
 }
 
 // Parameters of a knot of length dt [s] whose time is since_jump [s] after the target jumped. dt = 0: the terminal knot.
-template <class T> void reach_knot(const ReachTarget& target, double dt, double since_jump, typename Reach<T>::template Knot<double>& k) {
+template <class T> void reach_knot(const ReachTarget& target, Real dt, Real since_jump, typename Reach<T>::template Knot<Real>& k) {
   using R = typename T::Robot;
   const bool end = dt == 0.0;
-  const double urgency = since_jump > T::arrival_time ? T::arrival_factor : 1.0;
+  const Real urgency = since_jump > T::arrival_time ? T::arrival_factor : 1.0;
   k.dt = dt;
   k.pose_w_p = end ? T::end_position : dt * urgency * T::run_position;
   k.pose_w_R = end ? T::end_rotation : dt * urgency * T::run_rotation;

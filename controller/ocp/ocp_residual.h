@@ -92,18 +92,18 @@ template <class Term, class = void> inline constexpr bool kHasMultipliers = fals
 template <class Term> inline constexpr bool kHasMultipliers<Term, std::void_t<decltype(Term::A::kHasMultipliers)>> = true;
 
 // Calls f(parameters, residual) for each of the terms that holds a constraint, at a state.
-template <class R, class Knot, class F, class... Terms> void visit_constraints(Knot& knot, const double* x, const double* u, F f) {
+template <class R, class Knot, class F, class... Terms> void visit_constraints(Knot& knot, const Real* x, const Real* u, F f) {
   if constexpr ((kHasMultipliers<Terms> || ...)) {
-    RbdData<R, double> d;
+    RbdData<R, Real> d;
     rbd_kinematics(x, d);
     rbd_velocity(x + R::nq, d);
     rbd_inertias(d);
     rbd_composite_inertias(d);
-    const KnotView<R, double> view{x, x + R::nq, u, d, nullptr, nullptr};
+    const KnotView<R, Real> view{x, x + R::nq, u, d, nullptr, nullptr};
     const auto visit = [&](auto* term) {
       using Term = std::remove_pointer_t<decltype(term)>;
       if constexpr (kHasMultipliers<Term>) {
-        double r[Term::rows];
+        Real r[Term::rows];
         Term::residual(param_of<Term>(knot), view, r);
         f(param_of<Term>(knot), r);
       }

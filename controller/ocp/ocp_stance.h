@@ -17,17 +17,17 @@ namespace engram {
 
 // u (nu) [N m] from g (nv), which is overwritten, on the contacts of the mask `active`; d holds the kinematics. P: a problem with contacts
 // whose controls drive the last dofs.
-template <class P> void torques_on_contacts(const RbdData<typename P::R, double>& d, unsigned active, double (&g)[P::nv], double* u) {
+template <class P> void torques_on_contacts(const RbdData<typename P::R, Real>& d, unsigned active, Real (&g)[P::nv], Real* u) {
   using C = typename P::Contacts;
   constexpr const ContactTree<C>& tree = kContactTree<C>;
-  constexpr double kLever2 = 0.1 * 0.1;  // m^2
+  constexpr Real kLever2 = 0.1 * 0.1;  // m^2
   constexpr int first = P::nv - P::nu;
   static_assert(P::kFreeBase, "a robot that stands");
-  ContactData<C, double> cd;
+  ContactData<C, Real> cd;
   rbd_contact_jacobians<C>(d, active, cd);
   const auto weight = [](int row) { return row < 3 ? 1.0 : kLever2; };
-  Eigen::Matrix<double, 6, 6> A = Eigen::Matrix<double, 6, 6>::Zero();
-  Eigen::Matrix<double, 6, 1> y;
+  Eigen::Matrix<Real, 6, 6> A = Eigen::Matrix<Real, 6, 6>::Zero();
+  Eigen::Matrix<Real, 6, 1> y;
   for (int i = 0; i < 6; ++i) y[i] = g[i];
   for (int c = 0; c < C::n; ++c)
     for (int r = 0; contact_active(active, c) && r < tree.rows[c]; ++r)
@@ -37,7 +37,7 @@ template <class P> void torques_on_contacts(const RbdData<typename P::R, double>
   y = A.llt().solve(y);
   for (int c = 0; c < C::n; ++c)
     for (int r = 0; contact_active(active, c) && r < tree.rows[c]; ++r) {
-      double lambda = 0.0;
+      Real lambda = 0.0;
       for (int i = 0; i < 6; ++i) lambda += weight(r) * motion_entry(cd.J[c][i], r) * y[i];
       for (int a = 0; a < tree.path_n[c]; ++a) g[tree.path[c][a]] -= motion_entry(cd.J[c][a], r) * lambda;
     }
@@ -45,18 +45,18 @@ template <class P> void torques_on_contacts(const RbdData<typename P::R, double>
 }
 
 // At rest in the posture q (nq).
-template <class P> void stance_torques(const double* q, unsigned active, double* u) {
-  RbdData<typename P::R, double> d;
-  double g[P::nv];
+template <class P> void stance_torques(const Real* q, unsigned active, Real* u) {
+  RbdData<typename P::R, Real> d;
+  Real g[P::nv];
   rbd_kinematics<typename P::R>(q, d);
   rbd_gravity<typename P::R>(d, g);
   torques_on_contacts<P>(d, active, g, u);
 }
 
 // At (q, v) (nq, nv) with the acceleration a (nv).
-template <class P> void inverse_dynamics_on_contacts(const double* q, const double* v, const double* a, unsigned active, double* u) {
-  RbdData<typename P::R, double> d;
-  double g[P::nv];
+template <class P> void inverse_dynamics_on_contacts(const Real* q, const Real* v, const Real* a, unsigned active, Real* u) {
+  RbdData<typename P::R, Real> d;
+  Real g[P::nv];
   rbd_rnea<typename P::R>(q, v, a, d, g);
   torques_on_contacts<P>(d, active, g, u);
 }

@@ -19,7 +19,7 @@ template <class C, template <int> class Activation = Weighted> struct ZmpTerm {
   static_assert(!kHasMultipliers<ZmpTerm>, "multipliers are for residuals of the state");
   static constexpr bool kNeedsGravity = false, kOfContacts = true;
   static constexpr int kCoupledRows = 2, nf = kContactRows<C>;
-  static constexpr double kLeastForce = 1.0;  // N
+  static constexpr Real kLeastForce = 1.0;  // N
   template <class S> struct Param : A::template Param<S> {
     S ref[2];  // m, world axes
     S height;  // h [m]

@@ -65,7 +65,7 @@ template <class R, class S> inline void rbd_aba(const S* q, const S* v, const S*
     for (int k = kTree<R>.last[i]; k >= R::iv[i]; --k) {
       // U = IA J,  D = J . U,  u = tau - J . pA
       U[k] = IA[i] * d.J[k];
-      D_inv[k] = 1.0 / (dot(d.J[k], U[k]) + R::armature[k]);
+      D_inv[k] = 1.0 / (dot(d.J[k], U[k]) + S(R::armature[k]));
       u[k] = (tau[k] - dot(d.J[k], pA[i])) * D_inv[k];
       // IA - U U' / D,  pA + U u / D
       IA[i].downdate(U[k], D_inv[k]);

@@ -113,7 +113,7 @@ inline void rbd_contact_jacobians(const RbdData<R, S>& d, unsigned active, Conta
 
 // A pivot of G below this share of its diagonal entry is rounding: the contacts ask for the same motion twice, or for one that their
 // paths cannot make.
-inline constexpr double kSingularContact = 1e-13;
+inline constexpr Real kSingularContact = sizeof(Real) == sizeof(double) ? 1e-13 : 5e-5;  // 450 units of rounding
 
 // cd.U and the Cholesky factor of cd.G. After rbd_factor and rbd_contact_jacobians. A singular set of contacts leaves NaN, from which
 // the solver makes a status.

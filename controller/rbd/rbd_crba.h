@@ -20,21 +20,21 @@ template <class R, class S> inline void rbd_crba_lower(const RbdData<R, S>& d, B
   constexpr const Tree<R>& tree = kTree<R>;
   for (int k = 0; k < R::nv; ++k) {
     const Force<S> F = d.Yc[tree.joint[k]] * d.J[k];
-    M.diagonal[k] = dot(d.J[k], F) + R::armature[k];
+    M.diagonal[k] = dot(d.J[k], F) + S(R::armature[k]);
     for (int e = tree.first[k]; e < tree.first[k] + tree.depth[k]; ++e) M.below[e] = dot(d.J[tree.ancestor[e]], F);
   }
 }
 
 // The same for one state, as many ancestors at once as a Pack holds. In depth-first order the ancestors of dof k are what a stack holds
 // up to its depth: path[row][depth] is entry `row` of their columns of J.
-template <class R> inline void rbd_crba_lower(const RbdData<R, double>& d, BranchMatrix<R, double>& M) {
+template <class R> inline void rbd_crba_lower(const RbdData<R, Real>& d, BranchMatrix<R, Real>& M) {
   constexpr const Tree<R>& tree = kTree<R>;
-  double path[6][R::nv + kLanes] = {};  // beyond the depth: whatever, but numbers
+  Real path[6][R::nv + kLanes] = {};  // beyond the depth: whatever, but numbers
   for (int k = 0; k < R::nv; ++k) {
-    const Motion<double>& J = d.J[k];
-    const Force<double> F = d.Yc[tree.joint[k]] * J;
-    double* const row = M.below + tree.first[k];
-    M.diagonal[k] = dot(J, F) + R::armature[k];
+    const Motion<Real>& J = d.J[k];
+    const Force<Real> F = d.Yc[tree.joint[k]] * J;
+    Real* const row = M.below + tree.first[k];
+    M.diagonal[k] = dot(J, F) + Real(R::armature[k]);
     for (int a = 0; a < tree.depth[k]; a += kLanes) {  // what runs over the end of a row, the next one overwrites
       const auto part = [&](int r) { return load_pack(path[r] + a); };
       const Motion<Pack> columns = {{part(0), part(1), part(2)}, {part(3), part(4), part(5)}};

@@ -69,7 +69,7 @@ template <class R> inline constexpr Segments<R> kSegments{};
 template <class S, int w> struct RowPart {
   S x[w];
 
-  ENGRAM_INLINE explicit RowPart(double all) {
+  ENGRAM_INLINE explicit RowPart(Real all) {
     for (int i = 0; i < w; ++i) x[i] = S(all);
   }
   ENGRAM_INLINE explicit RowPart(const S* from) {
@@ -87,28 +87,28 @@ template <class S, int w> struct RowPart {
 };
 
 // Of doubles, as many as possible side by side in a Pack.
-template <int w> struct RowPart<double, w> {
+template <int w> struct RowPart<Real, w> {
   static constexpr int in_packs = w - w % kLanes;
   Pack p[w / kLanes + 1];
-  double x[kLanes];
+  Real x[kLanes];
 
-  ENGRAM_INLINE explicit RowPart(double all) {
+  ENGRAM_INLINE explicit RowPart(Real all) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] = Pack(all);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] = all;
   }
-  ENGRAM_INLINE explicit RowPart(const double* from) {
+  ENGRAM_INLINE explicit RowPart(const Real* from) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] = load_pack(from + i);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] = from[i];
   }
-  ENGRAM_INLINE void store(double* to) const {
+  ENGRAM_INLINE void store(Real* to) const {
     for (int i = 0; i < in_packs; i += kLanes) store_pack(p[i / kLanes], to + i);
     for (int i = in_packs; i < w; ++i) to[i] = x[i - in_packs];
   }
-  ENGRAM_INLINE void subtract(double l, const double* row) {
+  ENGRAM_INLINE void subtract(Real l, const Real* row) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] = nmadd(Pack(l), load_pack(row + i), p[i / kLanes]);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] = nmadd(l, row[i], x[i - in_packs]);
   }
-  ENGRAM_INLINE void scale(double d) {
+  ENGRAM_INLINE void scale(Real d) {
     for (int i = 0; i < in_packs; i += kLanes) p[i / kLanes] *= Pack(d);
     for (int i = in_packs; i < w; ++i) x[i - in_packs] *= d;
   }

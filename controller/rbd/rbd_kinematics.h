@@ -49,10 +49,10 @@ template <class R, class S> struct JointAngles {
 };
 
 // Of one state: all joints beforehand, as many side by side as a Pack holds.
-template <class R> struct JointAngles<R, double> {
-  double sine[R::nj + kLanes], cosine[R::nj + kLanes];
+template <class R> struct JointAngles<R, Real> {
+  Real sine[R::nj + kLanes], cosine[R::nj + kLanes];
 
-  ENGRAM_INLINE explicit JointAngles(const double* q) {
+  ENGRAM_INLINE explicit JointAngles(const Real* q) {
     for (int i = 0; i < R::nj; i += kLanes) {
       Pack angle(0.0), s, c;
       for (int l = 0; l < kLanes && i + l < R::nj; ++l)
@@ -62,7 +62,7 @@ template <class R> struct JointAngles<R, double> {
       store_pack(c, cosine + i);
     }
   }
-  ENGRAM_INLINE void at(int i, double& s, double& c) const {
+  ENGRAM_INLINE void at(int i, Real& s, Real& c) const {
     s = sine[i];
     c = cosine[i];
   }
@@ -130,7 +130,7 @@ template <class R, class S> inline void rbd_body_inertias(const RbdData<R, S>& d
 
 // Mass, centre of mass and inertia of the bodies, entry by entry; zero beyond the last.
 template <class R> struct BodyConstants {
-  double entry[10][R::nj + kLanes] = {};
+  Real entry[10][R::nj + kLanes] = {};
 
   constexpr BodyConstants() {
     for (int i = 0; i < R::nj; ++i) {
@@ -143,7 +143,7 @@ template <class R> struct BodyConstants {
 template <class R> inline constexpr BodyConstants<R> kBodyConstants{};
 
 // Of one state: as many bodies side by side as a Pack holds.
-template <class R> inline void rbd_body_inertias(const RbdData<R, double>& d, Inertia<double>* Y) {
+template <class R> inline void rbd_body_inertias(const RbdData<R, Real>& d, Inertia<Real>* Y) {
   for (int i = 0; i < R::nj; i += kLanes) {
     const int n = R::nj - i < kLanes ? R::nj - i : kLanes;
     const auto constant = [&](int e) { return load_pack(kBodyConstants<R>.entry[e] + i); };
@@ -162,7 +162,7 @@ template <class R> inline void rbd_body_inertias(const RbdData<R, double>& d, In
     const Inertia<Pack> side_by_side =
         inertia_in_world(R_WJ, p_WJ, constant(0), Vec3<Pack>(constant(1), constant(2), constant(3)), Ic);
     for (int l = 0; l < n; ++l) {
-      Inertia<double>& y = Y[i + l];
+      Inertia<Real>& y = Y[i + l];
       y.mass = R::mass[i + l];
       for (int r = 0; r < 3; ++r) y.moment[r] = side_by_side.moment[r][l];
       for (int e = 0; e < 6; ++e) y.I[e] = side_by_side.I[e][l];

@@ -10,7 +10,7 @@
 namespace engram {
 
 // Below this theta^2 the series take over; their truncation and the closed forms' cancellation are both under 1e-12 there.
-inline constexpr double kSeriesBelow = 0.5;
+inline constexpr Real kSeriesBelow = 0.5;
 
 // Coefficients of exp: a = sin(t)/t, b = (1 - cos t)/t^2, c = (t - sin t)/t^3.
 template <class S> struct ExpCoefficients {
@@ -44,7 +44,7 @@ template <class S> struct LogCoefficients {
     const S t2 = select(small, S(1.0), theta2);
     const S t = sqrt(t2);
     S s, c;  // of t/2
-    sincos(0.5 * t, s, c);
+    sincos(S(0.5) * t, s, c);
     const S closed_alpha = 0.5 * t * c / s;
     // Bernoulli series of x cot x
     beta = select(small,

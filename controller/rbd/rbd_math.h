@@ -1,4 +1,4 @@
-// Branch-free sine, cosine and arc tangent over a scalar S (double or Pack): the same operations in every lane.
+// Branch-free sine, cosine and arc tangent over a scalar S (Real or Pack): the same operations in every lane.
 #ifndef CONTROLLER_RBD_RBD_MATH_H_
 #define CONTROLLER_RBD_RBD_MATH_H_
 
@@ -14,14 +14,18 @@ template <class S, class... C> ENGRAM_INLINE S polynomial(S x, double c, C... hi
 
 // s = sin a, c = cos a [rad] within 1 ulp for |a| < 1e4 (absolute 1e-21 near their zeros).
 // Cody-Waite: a = n pi/2 + r + low with pi/2 in two parts (33 and 53 bits), |r| <= pi/4; then the minimax polynomials of fdlibm
-// (Sun, 1993), corrected to first order in low.
+// (Sun, 1993), corrected to first order in low. In single precision pi/2 is in two parts of 12 and 24 bits, for |a| < 1e3.
 template <class S> ENGRAM_INLINE void sincos(S a, S& s, S& c) {
-  constexpr double kRound = 0x1.8p52;  // adding it leaves the nearest integer in the low bits
+  constexpr bool kDouble = sizeof(Real) == sizeof(double);
+  constexpr Real kRound = kDouble ? 0x1.8p52 : 0x1.8p23;  // adding it leaves the nearest integer in the low bits
+  constexpr Real kHigh = kDouble ? 1.57079632673412561417 : 0x1.922p0;                            // the first bits of pi/2
+  constexpr Real kLow = kDouble ? 6.07710050650619224932e-11 : 1.57079632679489661923 - 0x1.922p0;  // what they lack
+  constexpr int kSign = 8 * sizeof(Real) - 2;                                                       // bit 1 to the sign
   const S shifted = madd(a, S(2.0 / 3.14159265358979323846), S(kRound));
   const S n = shifted - kRound;
-  const S exact = nmadd(n, S(1.57079632673412561417), a);
-  const S r = nmadd(n, S(6.07710050650619224932e-11), exact);
-  const S low = nmadd(n, S(6.07710050650619224932e-11), exact - r);
+  const S exact = nmadd(n, S(kHigh), a);
+  const S r = nmadd(n, S(kLow), exact);
+  const S low = nmadd(n, S(kLow), exact - r);
   const S z = r * r;
   const S sin_p = polynomial(z, -1.66666666666666324348e-01, 8.33333333332248946124e-03, -1.98412698298579493134e-04,
                              2.75573137070700676789e-06, -2.50507602534068634195e-08, 1.58969099521155010221e-10);
@@ -35,14 +39,14 @@ template <class S> ENGRAM_INLINE void sincos(S a, S& s, S& c) {
   const auto quadrant = to_bits(shifted);
   const auto sin_bits = to_bits(sin_r), cos_bits = to_bits(cos_r);
   const auto swap = (sin_bits ^ cos_bits) & -(quadrant & 1);
-  s = from_bits(sin_bits ^ swap ^ ((quadrant & 2) << 62));
-  c = from_bits(cos_bits ^ swap ^ (((quadrant + 1) & 2) << 62));
+  s = from_bits(sin_bits ^ swap ^ ((quadrant & 2) << kSign));
+  c = from_bits(cos_bits ^ swap ^ (((quadrant + 1) & 2) << kSign));
 }
 
 // Angle in [0, pi/2] of the point (x, y) in the first quadrant, x + y > 0, and its ratio to y (finite for y -> 0) through `per_y`.
 // Reduction to |t| <= 0.66 and the rational approximation of Cephes (Moshier, 1989), within 2 ulp.
 template <class S> ENGRAM_INLINE S atan2_first_quadrant(S y, S x, S& per_y) {
-  constexpr double kQuarterPi = 0.785398163397448309616, kHalfPi = 1.57079632679489661923;
+  constexpr Real kQuarterPi = 0.785398163397448309616, kHalfPi = 1.57079632679489661923;
   const auto near_y = y > x * 2.41421356237309504880, between = y > x * 0.66;
   const S numerator = select(near_y, -x, select(between, y - x, y));
   const S denominator = select(near_y, y, select(between, y + x, x));
