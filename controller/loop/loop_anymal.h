@@ -24,6 +24,8 @@ template <class Task_> struct AnymalBody {
                        Swing<3>, Cone<0>, Cone<1>, Cone<2>, Cone<3>>;
   static constexpr int legs = 12;  // driven dofs
   static constexpr int64_t kTickUs = 10000;
+  static constexpr int kIterations = 2;  // per tick; with one, every fourth push of 25 N s brought the trot down
+  static constexpr double kAcceleration = 1.5;  // of the pace [m/s^2, rad/s^2]
 
   template <class Param> static void cone(Param& p, double weight, double) {
     p.friction_w = weight;

@@ -6,7 +6,8 @@
 //              using P;      the problem;  template <int c> using Swing, Cone: its terms of contact c
 //              using Gait;   loop_gait.h
 //              static constexpr int legs;  driven dofs of the legs, which come first
-//              static constexpr int64_t kTickUs;
+//              static constexpr int64_t kTickUs;  static constexpr int kIterations;  per tick
+//              static constexpr double kAcceleration;  at which a commanded pace is taken up [m/s^2, rad/s^2]
 //              static void command(const double* task, LeggedCommand&);
 //              static void cone(Param&, double weight, double yaw), swing(Param&, double weight, const Placement&); };
 //
@@ -47,7 +48,7 @@ template <class C> class LeggedModel {
   using Hold = StanceHold<P>;
   using Target = LeggedCommand;
   using Knot = typename P::template Knot<double>;
-  static constexpr int N = Task::nknots, ntask = Task::ntask, nfeet = Contacts::n, kIterations = 1;
+  static constexpr int N = Task::nknots, ntask = Task::ntask, nfeet = Contacts::n, kIterations = C::kIterations;
   static constexpr int64_t kStepUs = static_cast<int64_t>(1e6 * Task::dt + 0.5), kTickUs = C::kTickUs;
   // A push opens gaps that take some periods to close, and lets light joints race; the plan of before the push would be worse than any.
   static constexpr double kLargestNearGap = 1e3, kLargestGap = 1e3, kLargestSpeed = StanceHold<P>::kOverspeed;
@@ -82,6 +83,7 @@ template <class C> class LeggedModel {
   static double at_height(const LeggedCommand& c, int64_t since_us);
   double blend(int64_t utime) const;
   void look(const double* x);
+  void follow();
   void replan();
   void pendulum();
   // Feet that stand in a slot: the phase of its knot.
@@ -93,6 +95,7 @@ template <class C> class LeggedModel {
 
   Gait<typename C::Gait> gait_;
   LeggedCommand now_, before_;   // the task, and the one it replaces
+  Pace pace_;                    // followed now: on its way to the task's
   int64_t origin_ = 0, taken_ = 0, before_taken_ = 0;  // us: slot 0; when they came
   double z_ = 0.0;               // height of the centre of mass at home above the feet [m]
   double com_[2] = {};           // reference at the slot under way [m]
@@ -158,6 +161,7 @@ template <class C> void LeggedModel<C>::begin(int64_t utime, const double* x) {
   }
   origin_ = taken_ = before_taken_ = utime;
   now_ = before_ = LeggedCommand{};
+  pace_ = Pace{};
 }
 
 template <class C> void LeggedModel<C>::take(int64_t utime, const Target& t) {
@@ -180,7 +184,14 @@ template <class C> double LeggedModel<C>::height(int64_t utime) const {
   return z_ + ground_ + (1.0 - s) * at_height(before_, utime - before_taken_) + s * at_height(now_, utime - taken_);
 }
 template <class C> double LeggedModel<C>::heading(int64_t utime) const {
-  return gait_.body_at((utime - origin_) / kStepUs, now_.pace).yaw;
+  return gait_.body_at((utime - origin_) / kStepUs, pace_).yaw;
+}
+
+// The pace goes to the task's at the acceleration that the robot bears: footholds of feet in the air would jump with it.
+template <class C> void LeggedModel<C>::follow() {
+  constexpr double step = C::kAcceleration * 1e-6 * kTickUs;
+  const auto towards = [](double from, double to) { return std::clamp(to, from - step, from + step); };
+  pace_ = {towards(pace_.vx, now_.pace.vx), towards(pace_.vy, now_.pace.vy), towards(pace_.wz, now_.pace.wz), now_.pace.walk};
 }
 
 // The centre of mass over the window, from where the reference is.
@@ -208,7 +219,7 @@ template <class C> void LeggedModel<C>::replan() {
     const double wanted = std::clamp(Task::gait_capture * error, -Task::gait_push_reach, Task::gait_push_reach);
     push_[i] = std::clamp(wanted, push_[i] - step, push_[i] + step);
   }
-  gait_.plan(now_.pace, kWindow, push_);
+  gait_.plan(pace_, kWindow, push_);
   pendulum();
 }
 
@@ -269,7 +280,7 @@ template <class C> void LeggedModel<C>::knot(int64_t utime, int64_t slot, double
     k.state_ref[R::nq + 1] += (i == 0 ? -std::sin(yaw) : std::cos(yaw)) * v;
   }
   k.state_ref[R::nq + 2] = (height(utime + kTickUs) - height(utime)) / (1e-6 * kTickUs);
-  if (gait_.walking()) k.state_ref[R::nq + 5] = now_.pace.wz;
+  if (gait_.walking()) k.state_ref[R::nq + 5] = pace_.wz;
   k.com_ref[2] = height(utime);
   for (int i = 0; i < 3; ++i) k.com_w[i] = weight * W::weights_com[i];
   const double* const carried = torque_of(gait_contacts(slot));
@@ -285,10 +296,11 @@ template <class C> void LeggedModel<C>::knot(int64_t utime, int64_t slot, double
 template <class C> void LeggedModel<C>::pose(const int64_t (&utime)[N + 1], const double* x0, Horizon<P, N>& h) {
   std::memcpy(q_, x0, sizeof(q_));
   look(x0);
+  follow();
   const int64_t slot = (utime[0] - origin_) / kStepUs;
   while (gait_.slot() < slot) {
     for (int i = 0; i < 2; ++i) com_[i] = reference_[i][1];
-    gait_.advance(gait_.slot() + 1, now_.pace);
+    gait_.advance(gait_.slot() + 1, pace_);
     if (gait_.slot() < slot) replan();
   }
   if (gait_.walking())

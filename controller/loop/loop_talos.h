@@ -26,6 +26,8 @@ template <class Task_, int kd> struct TalosBody {
   using P = ContactOcp<Soles, StateTerm<Robot>, TorqueTerm<Robot>, LimitTerm<Robot>, ComTerm<Robot>, Swing<0>, Swing<1>, Cone<0>, Cone<1>>;
   static constexpr int legs = 12;  // driven dofs
   static constexpr int64_t kTickUs = 10000;
+  static constexpr int kIterations = 1;  // per tick
+  static constexpr double kAcceleration = 1e3;  // of the pace [m/s^2, rad/s^2]: at once, as a step is chosen before it is made
 
   template <class Param> static void cone(Param& p, double weight, double yaw) {
     p.wrench_w = weight;

@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct AnymalTrot {
   using Robot = robots::Anymal;
   static constexpr char name[] = "anymal_trot";
-  static constexpr uint64_t digest = 0x46ea63cdfe14b8e8;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x0bb64eaebf2b80ca;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 4;
@@ -40,13 +40,13 @@ struct AnymalTrot {
   static constexpr double weights_base_velocity = 0x1.ep+4;  // 30
   static constexpr double weights_velocity[2] = {0x1p-1, 0.0};  // 0.5, 0
   static constexpr double weights_com[3] = {0x1.f4p+8, 0x1.f4p+8, 0x1.388p+13};  // 500, 500, 10000
-  static constexpr double weights_torque = 0x1.0624dd2f1a9fcp-10;  // 0.001
+  static constexpr double weights_torque = 0x1.0624dd2f1a9fcp-9;  // 0.002
   static constexpr double weights_torque_scale = 0x1.4p+6;  // 80
   static constexpr double weights_cone = 0x1.3333333333333p-2;  // 0.3
   static constexpr double weights_limit_q = 0.0;  // 0
   static constexpr double weights_terminal = 0x1.3333333333333p-2;  // 0.3
   static constexpr double weights_terminal_velocity = 0x1p+0;  // 1
-  static constexpr double sole_friction = 0x1.3333333333333p-1;  // 0.6
+  static constexpr double sole_friction = 0x1p-1;  // 0.5
   static constexpr double gait_swing = 0x1.cp+3;  // 14
   static constexpr double gait_stance = 0x1p+1;  // 2
   static constexpr double gait_lead = 0x1.8p+2;  // 6

@@ -52,7 +52,7 @@ TEST_F(TrotTest, TakesLateralPushesAtAnyPhase) {
   struct {
     double heading, impulse;  // rad, N s
     int at;                   // ms
-  } const pushes[] = {{0.0, 15.0, 1500}, {M_PI, -15.0, 1630}};
+  } const pushes[] = {{0.0, 15.0, 1500}, {M_PI, -15.0, 1630}, {0.4, 25.0, 1540}, {0.4, -25.0, 1780}};
   for (const auto& push : pushes) {
     LeggedPlant plant(kModel, push.heading);
     LeggedController c(kModel);
