@@ -137,3 +137,11 @@ def test_the_short_study_starts_warmer_than_cold():
     iterations = {part: found[f"study.3.3.iterations.{part}"] for part in ("q", "qu0", "qu", "u", "cold")}
     assert min(iterations, key=iterations.get) == "qu" and iterations["qu"] < 3 < iterations["cold"]
     assert found["study.3.3.success.qu"] == 1.0 and found["study.3.3.subopt1.qu"] < 1e-2
+
+
+def test_the_short_curves_fall():
+    """Row 9.1: after one iteration the memory is nearer to the optimum than its neighbour, its planner and a cold start."""
+    assert main(["study", "9.1", "--quick"]) == 0
+    found = {f["id"]: f["value"] for f in json.loads((BUILD / "figures" / "study.9.1.json").read_text(encoding="utf-8"))}
+    after = {name: found.get(f"study.9.1.excess.{name}.iteration1", np.inf) for name in ("cold", "planner", "knn", "gmr", "gpr")}
+    assert after["gpr"] < after["gmr"] < after["knn"] < after["cold"] and after["gpr"] < after["planner"]
