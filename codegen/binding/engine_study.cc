@@ -146,7 +146,7 @@ offline::Train train_of(const nb::list& cores) {
 }
 
 nb::tuple cross(const StudyCost& cost, const std::vector<int>& points, const In<2>& starts, int rank, int enrich, int sweeps,
-                double tolerance, uint64_t seed) {
+                double tolerance, uint64_t seed, int spread) {
   const int d = cost.d();
   check_shape<2>("starts", starts, {-1, d});
   if (int(points.size()) != d) throw nb::value_error("points: one number for each variable");
@@ -164,6 +164,7 @@ nb::tuple cross(const StudyCost& cost, const std::vector<int>& points, const In<
   options.rank = rank;
   options.enrich = enrich;
   options.sweeps = sweeps;
+  options.spread = std::min(std::max(spread, 0), d);
   options.tolerance = tolerance;
   options.seed = seed;
   int64_t evaluations = 0;
@@ -207,7 +208,7 @@ void bind_study(nb::module_& engine) {
       .def("density", &density, "x"_a, "Density (m) at x (m, d).")
       .def("refine", &refine, "x"_a, "evaluations"_a = 100,
            "x (m, d) with all but the task moved downhill by projected BFGS, and the cost (m) there.")
-      .def("cross", &cross, "points"_a, "starts"_a, "rank"_a, "enrich"_a = 8, "sweeps"_a = 4, "tolerance"_a = 1e-8, "seed"_a = 1,
+      .def("cross", &cross, "points"_a, "starts"_a, "rank"_a, "enrich"_a = 8, "sweeps"_a = 4, "tolerance"_a = 1e-8, "seed"_a = 1, "spread"_a = 0,
            "Cores of a tensor train of the density on a grid of `points`, grown from `starts` (m, d); and how many values it took.");
   engine.def("study_arm", &arm, "name"_a, "from_"_a = std::vector<double>{}, "to"_a = std::vector<double>{},
              "Cost on a compiled robot: 'panda.ik', ...; the ends of a 'transfer'.");

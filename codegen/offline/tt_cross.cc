@@ -1,6 +1,7 @@
 #include "codegen/offline/tt_cross.h"
 
 #include <algorithm>
+#include <limits>
 #include <numeric>
 #include <random>
 
@@ -48,9 +49,12 @@ class Cross {
     Train train{n_, std::vector<MatrixXd>(d_)};
     for (int sweep = 0; sweep < o_.sweeps; ++sweep) {
       const bool last = sweep + 1 >= o_.sweeps;
-      for (int k = 0; k + 1 < d_; ++k) train.core[k] = to_the_right(k, sweep == 0 ? o_.rank : o_.enrich);
+      const int m = sweep == 0 ? o_.rank : o_.enrich;
+      if (o_.spread > 0) choose_starts(m);
+      for (int k = 0; k + 1 < d_; ++k) train.core[k] = to_the_right(k, m);
       train.core[d_ - 1] = block(d_ - 1, left_[d_ - 1], count(left_[d_ - 1], d_ - 1), {}, 1);
       if (last) break;
+      if (o_.spread > 0) choose_starts(o_.enrich);
       for (int k = d_ - 1; k > 0; --k) to_the_left(k);
     }
     evaluations = evaluations_;
@@ -60,19 +64,49 @@ class Cross {
  private:
   static int count(const Indices& indices, int length) { return length == 0 ? 1 : int(indices.size()) / length; }
 
-  // Appends parts [begin, end) of `m` starting points that are not there yet, drawn without repetition.
+  // Starting points of this sweep: of four times as many, drawn at random, the m that lie farthest apart in the first `spread` variables,
+  // each found as the one farthest from those before it.
+  void choose_starts(int m) {
+    std::vector<int> order(starts_.size() / d_);
+    std::iota(order.begin(), order.end(), 0);
+    const std::size_t drawn = std::min(order.size(), std::size_t(4 * m));
+    for (std::size_t i = 0; i < drawn; ++i) std::swap(order[i], order[i + random_() % (order.size() - i)]);
+    order.resize(drawn);
+    std::vector<double> away(drawn, std::numeric_limits<double>::infinity());
+    chosen_.clear();
+    for (std::size_t at = 0; int(chosen_.size()) < m && chosen_.size() < drawn;) {
+      chosen_.push_back(order[at]);
+      for (std::size_t i = 0; i < drawn; ++i) {
+        double square = 0;
+        for (int k = 0; k < o_.spread; ++k) {
+          const double step = double(starts_[order[i] * d_ + k] - starts_[order[at] * d_ + k]) / n_[k];
+          square += step * step;
+        }
+        away[i] = std::min(away[i], square);
+      }
+      away[at] = -1;
+      at = std::size_t(std::max_element(away.begin(), away.end()) - away.begin());
+    }
+  }
+
+  // Appends parts [begin, end) of this sweep's starting points that are not there yet; without spread those of m others, drawn at random
+  // without repetition.
   void append_starts(Indices& indices, int begin, int end, int m) {
     const int length = end - begin;
-    std::vector<std::size_t> order(starts_.size() / d_);
-    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto append = [&](int start) {
+      const int32_t* from = starts_.data() + std::size_t(start) * d_ + begin;
+      for (std::size_t at = 0; at < indices.size(); at += length)
+        if (std::equal(from, from + length, &indices[at])) return false;
+      indices.insert(indices.end(), from, from + length);
+      return true;
+    };
+    for (const int start : chosen_) append(start);
+    if (o_.spread > 0) return;
+    std::vector<int> order(starts_.size() / d_);
+    std::iota(order.begin(), order.end(), 0);
     for (std::size_t i = 0; i < order.size() && m > 0; ++i) {
       std::swap(order[i], order[i + random_() % (order.size() - i)]);
-      const int32_t* from = starts_.data() + order[i] * d_ + begin;
-      bool known = false;
-      for (std::size_t at = 0; at < indices.size() && !known; at += length) known = std::equal(from, from + length, &indices[at]);
-      if (known) continue;
-      indices.insert(indices.end(), from, from + length);
-      --m;
+      if (append(order[i])) --m;
     }
   }
 
@@ -94,10 +128,10 @@ class Cross {
     return A;
   }
 
-  MatrixXd to_the_right(int k, int enrich) {
+  MatrixXd to_the_right(int k, int m) {
     const int q = d_ - 1 - k;
     Indices right = right_[k + 1];
-    append_starts(right, k + 1, d_, enrich);
+    append_starts(right, k + 1, d_, m);
     const MatrixXd Q = basis_of(block(k, left_[k], count(left_[k], k), right, count(right, q)), o_.rank, o_.tolerance);
     const std::vector<int> rows = maxvol(Q);
     left_[k + 1] = chosen_left(left_[k], k, n_[k], rows);
@@ -122,6 +156,7 @@ class Cross {
   const Indices& starts_;
   const CrossOptions& o_;
   std::mt19937_64 random_;
+  std::vector<int> chosen_;            // starting points of this sweep
   std::vector<Indices> left_, right_;  // left_[k]: indices of variables 0 .. k - 1; right_[k]: of k .. d - 1
   int64_t evaluations_ = 0;
 };

@@ -23,8 +23,9 @@ struct Train {
 
 struct CrossOptions {
   int rank = 20;            // largest rank
-  int enrich = 8;           // starting points that join the columns (or rows) of every block
+  int enrich = 8;           // starting points of a sweep; their parts join the columns (or rows) of its blocks. The first has `rank`
   int sweeps = 4;           // there and back is two; the last one runs to the right
+  int spread = 0;           // > 0: one set of starting points for all blocks of a sweep, apart in so many leading variables; 0: each block draws
   double tolerance = 1e-8;  // directions of a block smaller than this, relative to its largest, do not count
   uint64_t seed = 1;        // chooses among the starting points
 };

@@ -14,6 +14,7 @@ from engram.engine import engine
 
 SOLVED = 0.25  # cost at or below which a task counts as solved (thesis, caption of table 7.1)
 WORKERS = 2  # seeds that are built side by side
+JUDGED = (1, 10, 100)  # numbers of samples that a seed is judged by
 
 
 @dataclass(frozen=True)
@@ -33,6 +34,8 @@ class Recipe:
     start_cost: float = SOLVED  # of a solution, at most
     uniform: int = 20  # uniform points per starting task, of which the best is refined
     evaluations: int = 200  # of cost and gradient in one refinement
+    spread: bool = False  # starting points lie apart in the task, the same ones in all blocks of a sweep
+    start_evaluations: int = 0  # of cost and gradient on the way to a starting point; 0: as in a refinement
 
 
 @dataclass
@@ -75,7 +78,7 @@ def lowest(cost: engine.StudyCost, x: np.ndarray) -> tuple[np.ndarray, np.ndarra
 def solutions(cost: engine.StudyCost, tasks: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
     """Solved points (m, d): the best of some uniform points of each task, refined; those above the start cost are left out."""
     start, _ = lowest(cost, uniform_points(cost, tasks, recipe.uniform, rng))
-    refined, c = cost.refine(start, recipe.evaluations)
+    refined, c = cost.refine(start, recipe.start_evaluations or recipe.evaluations)
     return refined[c <= recipe.start_cost]
 
 
@@ -96,19 +99,21 @@ def build(
     validation: np.ndarray,
     alpha: float = 0.9,
 ) -> Built:
-    """The train of the seed whose single samples with priority alpha succeed most often on the validation tasks."""
+    """The train of the seed from whose samples with priority alpha most validation tasks are solved, on average over `JUDGED`."""
     cost.scale, cost.power = recipe.scale, recipe.power
     cpu, wall = time.process_time(), time.perf_counter()
     points = [recipe.points[0]] * cost.ntask + [recipe.points[1]] * (cost.d - cost.ntask)
     rng = np.random.default_rng(1)
     starts = solutions(cost, draw(rng, recipe.starts), recipe, rng)
 
+    spread = cost.ntask if recipe.spread else 0
+
     def one(seed: int) -> tuple[float, int, list[np.ndarray], Tt, engine.TensorTrain]:
-        cores, values = cost.cross(points, starts, recipe.rank, recipe.enrich, recipe.sweeps, recipe.tolerance, seed)
+        cores, values = cost.cross(points, starts, recipe.rank, recipe.enrich, recipe.sweeps, recipe.tolerance, seed, spread)
         table = table_of(cost, cores, recipe.type)
         train = engine.TensorTrain(table, 1000)
-        start, _ = lowest(cost, samples(train, cost, validation, alpha, 1))
-        _, c = cost.refine(start, recipe.evaluations)
+        drawn = samples(train, cost, validation, alpha, max(JUDGED))
+        c = np.array([cost.refine(lowest(cost, drawn[:, :n])[0], recipe.evaluations)[1] for n in JUDGED])
         # among equals, the lower cost
         return float(np.mean(c <= SOLVED)) - 1e-3 * float(np.mean(np.minimum(c, 1))), values, cores, table, train
 
