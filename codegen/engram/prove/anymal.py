@@ -3,7 +3,7 @@
 import numpy as np
 
 from engram.prove.report import Report, all_share
-from engram.prove.trial import Series, Trial, run_trial, run_trials
+from engram.prove.trial import Series, Trial, more_periods, run_trials
 
 MODEL = "anymal_trot"
 STAND = (0.1, (0.0, 0.0, 0.0, 0.0))  # first task
@@ -60,9 +60,6 @@ def prove(seed: int, quick: bool, cycles: int, jobs: int) -> Report:
             report.add(f"{name}.stands", share, "1", n)
         runs += pushed
     report.add("torque_share", all_share(runs), "1", sum(len(run["time"]) for run in runs), "<= 1", all_share(runs) <= 1.0)
-    have = sum(len(run["time"]) for run in runs)
-    if cycles > have:
-        print(f"  {cycles - have} more periods, for their times ...", flush=True)
-        runs.append(run_trial(trot(0.01 * (cycles - have) + 1.0, 0.3, 0.0)))
+    runs += more_periods(cycles, runs, MODEL, (STAND[0], (0.3, 0.0, 0.0, 1.0)), 0.0, jobs)
     report.add_times(runs)
     return report

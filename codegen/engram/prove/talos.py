@@ -3,10 +3,11 @@
 import subprocess
 
 import numpy as np
+from tqdm import tqdm
 
 from engram.paths import BUILD
 from engram.prove.report import Report, all_share
-from engram.prove.trial import Series, Trial, run_trial, run_trials
+from engram.prove.trial import Series, Trial, more_periods, run_trial, run_trials
 
 MODEL = "talos_stand"
 STAND, SETTLED = (0.1, (0.0, 0.0, 0.0)), 2.0  # first task; s after which it has settled
@@ -90,7 +91,8 @@ def prove(seed: int, quick: bool, cycles: int, jobs: int) -> Report:
     if not quick:
         program = [BUILD / "bin" / "engram-trial", MODEL, "limits"]
         limits = map(float, subprocess.run(program, capture_output=True, check=True, text=True).stdout.split())
-        for (name, way, wanted), limit in zip(PUSHES, limits):
+        ways = tqdm(list(zip(PUSHES, limits)), desc="largest pushes", unit="way", leave=False)
+        for (name, way, wanted), limit in ways:
             most = min(largest(h, way, wanted + 2.0, 2.0) for h in headings)
             report.add(f"push.{name}", most, "N s", len(headings), f">= {wanted:.0f}", most >= wanted)
             report.add(f"push.{name}_limit", limit, "N s", 1)
@@ -105,9 +107,6 @@ def prove(seed: int, quick: bool, cycles: int, jobs: int) -> Report:
         report.add("walk.push10.stands", np.mean([stopped(run) for run in blows]), "1", n)
     runs += walks + blows
     report.add("torque_share", all_share(runs), "1", sum(len(run["time"]) for run in runs), "<= 1", all_share(runs) <= 1.0)
-    have = sum(len(run["time"]) for run in runs)
-    if cycles > have:
-        print(f"  {cycles - have} more periods, for their times ...", flush=True)
-        runs.append(run_trial(Trial(MODEL, TICK * (cycles - have) + 1.0, heading, (squats,))))
+    runs += more_periods(cycles, runs, MODEL, squats, heading, jobs)
     report.add_times(runs)
     return report

@@ -87,6 +87,14 @@ def run_trials(trials: list[Trial], jobs: int, title: str) -> list[Series]:
         return found
 
 
+def more_periods(cycles: int, have: list[Series], model: str, task: tuple, heading: float, jobs: int) -> list[Series]:
+    """Runs of a minute at one task, until all runs together have so many control periods (10 ms each)."""
+    left = cycles - sum(len(run["time"]) for run in have)
+    n = max(0, -(-left // 6000))
+    trial = Trial(model, 60.0, heading, (task,))
+    return run_trials([trial] * n, jobs, "periods to time") if n else []
+
+
 def cycle_times(runs: list[Series]) -> dict[str, np.ndarray]:
     """CPU time of the control periods of all runs that had a plan [us], by phase."""
     used = [(run["rung"] == 0) & (run["total_us"] > 0) for run in runs]
