@@ -21,7 +21,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("robot", choices=["talos", "anymal"], help="which robot")
     parser.add_argument("--seed", type=int, default=1, help="of headings, phases and sides (default: 1)")
     parser.add_argument("--quick", action="store_true", help="a few seconds of each")
-    parser.add_argument("--cycles", type=int, help="control periods to time, at least (default: 100000; --quick: no more than ran)")
+    parser.add_argument("--cycles", type=int, help="control periods to time (default: 100000; --quick: those that ran)")
     parser.add_argument("--jobs", type=int, default=1, help="runs side by side; times are clean with 1 (default: 1)")
     return parser
 
