@@ -34,7 +34,7 @@ bench: setup
 tables: setup
 	@scripts/tables.sh
 
-study: export TARGETS = _engine
+study: export TARGETS = _engine $(if $(filter 7%,$(S)),engram-pole)
 study: setup
 	@.venv/bin/engram study $(S) $(if $(QUICK),--quick) $(ARGS)
 

@@ -37,6 +37,7 @@ typedef struct engram_model engram_model;            // one robot, task and memo
 extern const engram_model engram_panda_reach;
 extern const engram_model engram_talos_stand;
 extern const engram_model engram_talos_walk;
+extern const engram_model engram_talos_pole;
 extern const engram_model engram_anymal_trot;
 extern const engram_model engram_hector_fly;
 

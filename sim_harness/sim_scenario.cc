@@ -30,6 +30,20 @@ std::string take_push(bool smooth, const std::string& body, const std::vector<do
   return "";
 }
 
+std::string take_reach(std::istringstream& line, const Model& model, Trial* trial) {
+  std::string t, bound, site;
+  line >> t >> bound >> site;
+  std::istringstream first(t + " " + bound);
+  std::vector<double> numbers;
+  if (!read_numbers(first, &numbers) || !read_numbers(line, &numbers) || numbers.size() != 5) return "the form is `reach t m site x y z`";
+  trial->site = mj_name2id(model.m, mjOBJ_SITE, site.c_str());
+  if (trial->site < 0) return "the scene has no site '" + site + "'";
+  if (numbers[0] < 0 || numbers[0] >= trial->duration || numbers[1] <= 0) return "`reach` needs a time within the episode and a positive bound";
+  trial->reach.t = numbers[0], trial->reach.bound = numbers[1];
+  std::copy(numbers.begin() + 2, numbers.end(), trial->reach.want);
+  return "";
+}
+
 std::string take_line(const std::string& key, std::istringstream& line, const Model& model, Trial* trial) {
   std::vector<double> numbers;
   if (key == "push" || key == "gust") {
@@ -39,6 +53,13 @@ std::string take_line(const std::string& key, std::istringstream& line, const Mo
     if (!read_numbers(times, &numbers) || !read_numbers(line, &numbers) || (numbers.size() != 5 && numbers.size() != 8))
       return "the form is `" + key + " t d body fx fy fz [tx ty tz]`";
     return take_push(key == "gust", body, numbers, model, trial);
+  }
+  if (key == "reach") return take_reach(line, model, trial);
+  if (key == "clear") {
+    std::string geom;
+    line >> geom;
+    trial->clear = mj_name2id(model.m, mjOBJ_GEOM, geom.c_str());
+    return trial->clear < 0 ? "the scene has no geom '" + geom + "'" : "";
   }
   if (!read_numbers(line, &numbers)) return "not a finite number";
   const int n = static_cast<int>(numbers.size()), wanted = numbers_of(key);
@@ -124,6 +145,8 @@ std::string Referee::reason(const Trial& trial, const TrialRecord& r) {
   add(trial.drift.asked() && !(r.drift <= trial.drift.bound), "drift");
   add(trial.height.asked() && !(r.height_rms() <= trial.height.bound), "height");
   add(trial.pace.asked() && !r.fallen && off_pace(), "pace");
+  add(trial.reach.asked() && !r.fallen && !(r.reach <= trial.reach.bound), "reach");
+  add(r.touched, "touch");
   add(r.torque_share > 1 + kTorqueTolerance || r.joint_excess > kJointTolerance, "limit");
   return text.empty() ? "ok" : text;
 }
@@ -175,6 +198,16 @@ void Referee::measure(const Trial& trial, const Model& model, double since, Tria
     r->height_sum += (com[2] - wanted) * (com[2] - wanted);
     ++r->height_steps;
   }
+  if (holds(trial.reach)) {
+    const mjtNum* const at = model.d->site_xpos + 3 * trial.site;
+    const double* const w = trial.reach.want;
+    const double far = std::sqrt((at[0] - w[0]) * (at[0] - w[0]) + (at[1] - w[1]) * (at[1] - w[1]) + (at[2] - w[2]) * (at[2] - w[2]));
+    r->reach = std::max(r->reach, far);
+  }
+  for (int i = 0; trial.clear >= 0 && i < model.d->ncon; ++i) {
+    const mjContact& c = model.d->contact[i];
+    r->touched = r->touched || ((c.geom1 == trial.clear || c.geom2 == trial.clear) && c.dist <= 0);
+  }
   if (begins(trial.pace)) {
     from_[0] = p[0], from_[1] = p[1];
     from_yaw_ = yaw_;
@@ -225,6 +258,8 @@ void Referee::write(std::FILE* file) const {
     if (trial.drift.asked()) std::fprintf(file, ", \"com_drift_m\": %.6f", r.drift);
     if (trial.height.asked()) std::fprintf(file, ", \"com_height_rms_m\": %.6f", r.height_rms());
     if (trial.pace.asked()) std::fprintf(file, ", \"pace\": [%.4f, %.4f, %.4f]", r.pace[0], r.pace[1], r.pace[2]);
+    if (trial.reach.asked()) std::fprintf(file, ", \"reach_error_m\": %.4f", r.reach);
+    if (trial.clear >= 0) std::fprintf(file, ", \"touched\": %s", r.touched ? "true" : "false");
     std::fprintf(file, ", \"statuses\": ");
     write_statuses(file, r.statuses);
     std::fprintf(file, "}");

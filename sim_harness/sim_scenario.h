@@ -14,6 +14,8 @@
 //                                      + z - d (1 - cos(2 pi f s)) / 2, s: time since the last task
 //   pace t m  vx vy wz                 from t on to the end the base's mean velocity, in axes of its first heading, and its turning rate
 //                                      are these within m (m/s, rad/s)
+//   reach t m <site> x y z             from t on a site of the robot stays within m metres of this point (m, world axes)
+//   clear <geom>                       the robot never touches this geom of the world
 //
 // Empty lines and lines that start with # are skipped. Numbers in C notation, hexadecimal floats included.
 #ifndef ENGRAM_SIM_HARNESS_SIM_SCENARIO_H_
@@ -47,7 +49,9 @@ struct Trial {
   std::vector<TimedTask> tasks;  // in order of time
   std::vector<Push> pushes;
   double lowest = 0, tilt = 4;  // m, rad
-  Demand drift, height, pace;
+  Demand drift, height, pace, reach;
+  int site = -1;    // of `reach`
+  int clear = -1;   // geom; -1: not asked for
 };
 
 struct Scenario {
@@ -68,6 +72,8 @@ struct TrialRecord {
   double height_sum = 0;   // m^2, sum of squared errors
   long height_steps = 0;
   double pace[3]{};        // m/s, rad/s
+  double reach = 0;        // m, largest distance since Demand::t
+  bool touched = false;
   double joint_excess = 0, torque_share = 0;
   int statuses[kMaxStatus] = {};
 
@@ -85,7 +91,7 @@ class Referee : public Script {
   void write(std::FILE* file) const override;
 
   const std::vector<TrialRecord>& records() const { return records_; }
-  // "ok", or what failed, joined by '+': fall, drift, height, pace, limit.
+  // "ok", or what failed, joined by '+': fall, drift, height, pace, reach, touch, limit.
   static std::string reason(const Trial& trial, const TrialRecord& record);
 
  private:

@@ -181,7 +181,7 @@ int Program::run() {
 int main(int argc, char** argv) {
   engram::io::Settings settings;
   int exit_code = 0;
-  const engram::io::Models models = {&engram_panda_reach, &engram_talos_stand, &engram_talos_walk, &engram_anymal_trot, &engram_hector_fly};
+  const engram::io::Models models = {&engram_panda_reach, &engram_talos_stand, &engram_talos_walk, &engram_talos_pole, &engram_anymal_trot, &engram_hector_fly};
   if (!engram::io::read_settings(argc, argv, models, &settings, &exit_code)) return exit_code;
   return engram::io::Program(settings).run();
 }

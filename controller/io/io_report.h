@@ -28,7 +28,7 @@ namespace engram::io {
     "compensation, then no torque",                                                                                       \
     "bad states")                                                                                                         \
   X(kStaleState, "no good state for too long: plan dropped", "stale states")                                              \
-  X(kBadTask, "task not finite: ignored, the last task stays", "bad tasks")                                               \
+  X(kBadTask, "task refused (not finite, out of range or within an obstacle): the last task stays", "bad tasks")                                               \
   X(kTaskFar, "target outside the range the memory was built for: memory not asked, straight lines tried", "far targets") \
   X(kPublish, "a message could not be sent (network down?)", "unsent")                                                    \
   X(kFile, "a file could not be written (disk full?): writing stopped", "file errors")

@@ -36,6 +36,22 @@ struct LeggedCommand {
   Pace pace;
   double height = 0.0;             // of the centre of mass above its height at home [m]
   double depth = 0.0, rate = 0.0;  // squats: down by depth and back [m], rate times per second [Hz]
+  double hand[3] = {};             // where a hand shall be [m], world axes; of a configuration that reaches
+};
+
+// A configuration that reaches with a hand has `static constexpr bool kReaches = true` and, beyond the above,
+//   static bool reachable(const LeggedCommand&)                          may a hand be there?
+//   static void reach(Knot&, double weight, const LeggedCommand&, bool terminal)   terms of hand and obstacles of a knot that weighs so [s]
+//   static void hand(const double* x, double (&p)[3])                    where it is [m]
+template <class C, class = void> inline constexpr bool kReaches = false;
+template <class C> inline constexpr bool kReaches<C, std::void_t<decltype(C::kReaches)>> = C::kReaches;
+
+// The memory of a configuration: C::Memory, or none.
+template <class C, class = void> struct MemoryOfLegs {
+  using Type = NoMemory;
+};
+template <class C> struct MemoryOfLegs<C, std::void_t<typename C::Memory>> {
+  using Type = typename C::Memory;
 };
 
 template <class C> class LeggedModel {
@@ -44,7 +60,7 @@ template <class C> class LeggedModel {
   using R = typename P::R;
   using Contacts = typename P::Contacts;
   using Task = typename C::Task;
-  using Memory = NoMemory;
+  using Memory = typename MemoryOfLegs<C>::Type;
   using Hold = StanceHold<P>;
   using Target = LeggedCommand;
   using Knot = typename P::template Knot<double>;
@@ -56,6 +72,9 @@ template <class C> class LeggedModel {
 
   static bool target(const double* value, Target& t) {
     C::command(value, t);
+    if constexpr (kReaches<C>) {
+      if (!C::reachable(t)) return false;
+    }
     return known(value);
   }
   static bool known(const double* value) {
@@ -64,7 +83,8 @@ template <class C> class LeggedModel {
     return true;
   }
   static void path(const double* x, double (&p)[3]) {
-    for (int i = 0; i < 3; ++i) p[i] = x[i];
+    if constexpr (kReaches<C>) C::hand(x, p);
+    else std::memcpy(p, x, sizeof p);
   }
 
   void begin(int64_t utime, const double* x);
@@ -290,6 +310,7 @@ template <class C> void LeggedModel<C>::knot(int64_t utime, int64_t slot, double
     k.torque_ref[i] = carried[i];
   }
   k.limit_w_q = dt * W::weights_limit_q;
+  if constexpr (kReaches<C>) C::reach(k, weight, now_, terminal);
   for_contact<Contacts>([&](auto c) { foot<c>(slot, dt, terminal, when, k); });
 }
 

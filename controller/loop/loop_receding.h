@@ -15,19 +15,14 @@
 //   void extend(const Horizon<P, N>&, int k, const double* x, double* u, double* x_next)   a guess of knot k from state x on
 //   static void path(const double* x, double p[3])                    the point of the robot that is reported along the plan [m]
 //
-// It need not have contacts, nor phases.
+// It need not have contacts, nor phases. A model whose M::Memory `kRemembers` has a rival to the shifted plan at every tick (loop_rival.h).
 #ifndef CONTROLLER_LOOP_LOOP_RECEDING_H_
 #define CONTROLLER_LOOP_LOOP_RECEDING_H_
 
 #include "controller/loop/loop_core.h"
+#include "controller/loop/loop_rival.h"
 
 namespace engram {
-
-// The memory of a model that has none.
-struct NoMemory {
-  static bool tables_fit() { return true; }
-  static uint64_t table_digest() { return 0; }
-};
 
 template <class M> class RecedingPlanner : public PlannerCore<M, RecedingPlanner<M>> {
  public:
@@ -35,23 +30,25 @@ template <class M> class RecedingPlanner : public PlannerCore<M, RecedingPlanner
   using typename Core::Fast, typename Core::P;
   using Core::N, Core::nx;
 
-  RecedingPlanner(const engram_options& options, Fast& fast) : Core(options, fast) {}
+  RecedingPlanner(const engram_options& options, Fast& fast) : Core(options, fast), rival_(options) {}
 
   engram_status prepare(int64_t utime);
   engram_status roll(int64_t utime);
 
  private:
   using typename Core::Trial;
-  using Core::cycle_, Core::ending_, Core::has_task_, Core::jumped_, Core::options_, Core::plan_, Core::prepared_, Core::solve_,
-      Core::task_, Core::trial_, Core::watch_;
+  using Core::cycle_, Core::ending_, Core::has_task_, Core::jumped_, Core::options_, Core::plan_, Core::prepared_, Core::seq_,
+      Core::solve_, Core::task_, Core::trial_, Core::watch_;
 
   bool iterate(const Plan<P, N>& before, bool fresh, Deadline& deadline);
+  bool challenge(Deadline& deadline);
 
   M model_;
   int64_t origin_ = 0;  // us, whole knots end at origin_ + m kStepUs
   int64_t taken_ = -1;  // us, time of the task that the model has
   int64_t utime_[N + 1];
   Seed<P, N> seed_;
+  Rival<M> rival_;
 };
 
 // The trajectory before, on the new knot times, iterated and swept; a fresh one stands still. False if the solver failed.
@@ -69,6 +66,27 @@ template <class M> bool RecedingPlanner<M>::iterate(const Plan<P, N>& before, bo
   solve_.start(seed_.x, seed_.u, fresh ? 0.0 : solve_.reg());
   const int iterations = fresh ? options_.iterations_jump : options_.iterations;
   return solve_.improve(iterations - 1, deadline, [] {}) && solve_.ready();
+}
+
+// What the memory proposes takes the place of the shifted plan if it costs less after iterations of its own. False if the solver failed.
+template <class M> bool RecedingPlanner<M>::challenge(Deadline& deadline) {
+  const double begin = deadline.now();
+  if (jumped_) rival_.forget();
+  const bool asked = rival_.ask(task_.target, seq_, solve_, [&](int k, const double* x, double* u, double* x_next) {
+    model_.extend(solve_.horizon, k, x, u, x_next);
+  });
+  const double answered = deadline.now();
+  cycle_.asked_us[ENGRAM_CANDIDATE_KNN] = answered - begin;
+  cycle_.query_us += answered - begin;
+  if (!asked) return true;
+  rival_.improve(solve_, deadline);
+  cycle_.candidates_us = deadline.now() - answered;
+  cycle_.guess[1] = ENGRAM_CANDIDATE_KNN;
+  cycle_.merit[1] = rival_.merit();
+  cycle_.nguess = 2;
+  if (!(rival_.merit() < (1.0 - options_.switch_gain) * solve_.merit())) return true;
+  cycle_.winner = ENGRAM_CANDIDATE_KNN;
+  return rival_.take_over(solve_);
 }
 
 template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
@@ -96,11 +114,17 @@ template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
   model_.pose(utime_, solve_.horizon.x0, solve_.horizon);
   cycle_.query_us = deadline.now() - posing;
   cycle_.nguess = 1;
-  cycle_.winner = cycle_.guess[0] = fresh ? ENGRAM_CANDIDATE_COLD : ENGRAM_CANDIDATE_SHIFTED;
-  if (iterate(postponed ? solve_.plan : plan_, fresh, deadline)) {
+  const bool cold = fresh || (options_.memory == ENGRAM_MODE_COLD && jumped_);
+  cycle_.winner = cycle_.guess[0] = cold ? ENGRAM_CANDIDATE_COLD : ENGRAM_CANDIDATE_SHIFTED;
+  if (iterate(postponed ? solve_.plan : plan_, cold, deadline)) {
     cycle_.merit[0] = solve_.merit();
-    trial_ = Trial::kReady;
+    bool ready = true;
+    if constexpr (M::Memory::kRemembers) {
+      if (options_.memory == ENGRAM_MODE_MEMORY && task_.known && !fresh) ready = challenge(deadline);
+    }
+    if (ready) trial_ = Trial::kReady;
     if (deadline.late()) ending_ = ENGRAM_DEADLINE;
+    if (!ready) ending_ = solve_.failure();
   } else {
     ending_ = solve_.failure();
   }

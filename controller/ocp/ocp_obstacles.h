@@ -84,7 +84,8 @@ template <class G> struct GridField {
   }
 };
 
-template <class R, class Field> struct ObstacleTerm {
+// Spheres: nsphere, sphere_joint, p_JS, sphere_radius; the robot itself, or a task with spheres of its own.
+template <class R, class Field, class Spheres = R> struct ObstacleTerm {
   static constexpr bool kNeedsGravity = false;
   template <class S> struct Param {
     S obstacle_w;       // weight [1/m^2]
@@ -93,11 +94,11 @@ template <class R, class Field> struct ObstacleTerm {
 
   template <class S> static S cost(const Param<S>& p, const KnotView<R, S>& k) {
     S c = 0.0;
-    for (int s = 0; s < R::nsphere; ++s) {
-      const Vec3<S> center = rbd_sphere_position<R>(k.d, s);
+    for (int s = 0; s < Spheres::nsphere; ++s) {
+      const Vec3<S> center = rbd_sphere_position<R, Spheres>(k.d, s);
       for (int o = 0; o < Field::count; ++o) {
         Vec3<S> g;
-        const S e = max(p.obstacle_margin + S(R::sphere_radius[s]) - Field::distance(o, center, g), S(0.0));
+        const S e = max(p.obstacle_margin + S(Spheres::sphere_radius[s]) - Field::distance(o, center, g), S(0.0));
         c += e * e;
       }
     }
@@ -106,13 +107,13 @@ template <class R, class Field> struct ObstacleTerm {
 
   template <class S> static S expand(const Param<S>& p, const KnotView<R, S>& k, ModelOf<R, S>& M) {
     S c = 0.0;
-    for (int s = 0; s < R::nsphere; ++s) {
-      const Vec3<S> center = rbd_sphere_position<R>(k.d, s);
+    for (int s = 0; s < Spheres::nsphere; ++s) {
+      const Vec3<S> center = rbd_sphere_position<R, Spheres>(k.d, s);
       Vec3<S> gradient = Vec3<S>::Zero();  // - sum_o e_o g_o
       S H[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};  // sum_o [e_o > 0] g_o g_o': xx xy xz yy yz zz
       for (int o = 0; o < Field::count; ++o) {
         Vec3<S> g;
-        const S e = max(p.obstacle_margin + S(R::sphere_radius[s]) - Field::distance(o, center, g), S(0.0));
+        const S e = max(p.obstacle_margin + S(Spheres::sphere_radius[s]) - Field::distance(o, center, g), S(0.0));
         const S active = select(e > S(0.0), S(1.0), S(0.0));
         c += e * e;
         gradient -= g * e;
@@ -120,7 +121,7 @@ template <class R, class Field> struct ObstacleTerm {
         for (int i = 0, n = 0; i < 3; ++i)
           for (int j = i; j < 3; ++j) H[n++] += ag[i] * g[j];
       }
-      add_point(p.obstacle_w, DofPath<R>(R::sphere_joint[s]), center, gradient, H, k.d, M);
+      add_point(p.obstacle_w, DofPath<R>(Spheres::sphere_joint[s]), center, gradient, H, k.d, M);
     }
     return S(0.5) * p.obstacle_w * c;
   }

@@ -66,10 +66,10 @@ template <class R, class S> inline Vec3<S> rbd_point_velocity(const RbdData<R, S
   return cross_add(d.V[i].ang, p_W, d.V[i].lin);
 }
 
-// Centre of collision sphere s in the world [m].
-template <class R, class S> inline Vec3<S> rbd_sphere_position(const RbdData<R, S>& d, int s) {
-  const int i = R::sphere_joint[s];
-  return mul_add(d.R_WJ[i], constant3<S>(R::p_JS[s]), d.p_WJ[i]);
+// Centre of collision sphere s of the set `Spheres` in the world [m].
+template <class R, class Spheres = R, class S> inline Vec3<S> rbd_sphere_position(const RbdData<R, S>& d, int s) {
+  const int i = Spheres::sphere_joint[s];
+  return mul_add(d.R_WJ[i], constant3<S>(Spheres::p_JS[s]), d.p_WJ[i]);
 }
 
 }  // namespace engram

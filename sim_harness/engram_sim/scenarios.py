@@ -77,6 +77,24 @@ def talos_walk(spec: MotionSpec, seed: int, parts: int | None) -> Script:
     return scenario(spec, seed, episodes, "torso")
 
 
+def talos_pole(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """The right hand goes to points beside the pole: to one, and then to another on the other side."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    pole = spec.boxes.p_WO[0]
+    radius, episodes = float(spec.constants["success_position"]), []
+    for n in range(parts or 8):
+        points = [
+            [rng.uniform(0.32, 0.45), pole[1] + side * rng.uniform(0.16, 0.3), rng.uniform(0.95, 1.2)]
+            for side in ((-1.0, 1.0), (-1.0, 1.0, -1.0))[n % 2]
+        ]
+        times = [0.0, 3.0, 7.0][: len(points)]
+        tasks = [f"task {t} {numbers(np.array(p))}" for t, p in zip(times, points)]
+        end = times[-1] + 4.0
+        asked = [f"reach {end - 0.3} {radius} right_gripper {numbers(np.array(points[-1]))}", "clear pole", "upright 0.6 0.7"]
+        episodes.append([f"episode around_{n + 1} {end}", home(spec, 0.0), *tasks, *asked])
+    return scenario(spec, seed, episodes, "right_gripper")
+
+
 def anymal_trot(spec: MotionSpec, seed: int, parts: int | None) -> Script:
     """Standing, trotting in place and forward for a minute, and lateral pushes at random phases of the gait."""
     rng = np.random.default_rng([HELD_OUT, seed])
@@ -129,6 +147,7 @@ def hector_fly(spec: MotionSpec, seed: int, parts: int | None) -> Script:
 MOTIONS: dict[str, Callable[[MotionSpec, int, int | None], Script]] = {
     "talos_stand": talos_stand,
     "talos_walk": talos_walk,
+    "talos_pole": talos_pole,
     "anymal_trot": anymal_trot,
     "hector_fly": hector_fly,
 }

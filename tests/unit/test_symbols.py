@@ -17,7 +17,7 @@ FORBIDDEN = (
     "malloc free _Znwm _ZdlPv __cxa_throw __gxx_personality_v0 _Unwind_Resume printf fwrite "
     "puts abort __assert_fail pthread_mutex_lock __cxa_guard_acquire _ZSt20__throw_length_errorPKc"
 ).split()
-MODELS = ["panda_reach", "talos_stand", "talos_walk", "anymal_trot", "hector_fly"]
+MODELS = ["panda_reach", "talos_stand", "talos_walk", "talos_pole", "anymal_trot", "hector_fly"]
 ARCHIVES = [*(f"controller/libengram_{name}.a" for name in MODELS), "controller/tab/libengram_tab.a"]
 
 

@@ -16,6 +16,7 @@ ROWS = {
     "6.6": "sampling",
     "6.7": "arms",
     "6.8": "arms",
+    "7.1": "pole",
     "9.1": "step_curves",
 }
 

@@ -26,8 +26,9 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
 
 def run(args: argparse.Namespace) -> int:
     """Write task.h and scene.xml; with --meshes also the scene that shows the robot's meshes."""
+    from engram.robots.emit_mjcf import robot_mjcf
     from engram.tasks.emit_header import task_header
-    from engram.tasks.motion import load_motion
+    from engram.tasks.motion import MotionSpec, load_motion
     from engram.tasks.scene import scene_mjcf, write_shown_scene
     from engram.tasks.spec import load_task, open_task
 
@@ -37,7 +38,11 @@ def run(args: argparse.Namespace) -> int:
     folder = args.tables / f"{args.robot}_{args.task}"
     folder.mkdir(parents=True, exist_ok=True)
     write_changed(folder / "task.h", task_header(spec))
-    scene = scene_mjcf(spec, args.tables / args.robot / "robot.xml", world, folder)
+    robot_xml = args.tables / args.robot / "robot.xml"
+    if isinstance(spec, MotionSpec) and spec.has_spheres:  # the robot of this task touches with more than its own
+        robot_xml = folder / "robot.xml"
+        write_changed(robot_xml, robot_mjcf(spec.guarded, digest=spec.robot.digest))
+    scene = scene_mjcf(spec, robot_xml, world, folder)
     write_changed(folder / "scene.xml", scene)
     sizes = f"vector {len(spec.vector_name)}  boxes {len(spec.boxes.name)}"
     print(f"task:   {relative(folder)}/task.h scene.xml  {sizes}  digest {spec.digest:016x}")

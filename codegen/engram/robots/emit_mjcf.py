@@ -28,15 +28,18 @@ def quaternion(R: np.ndarray) -> str:
     return words([w, x, y, z])
 
 
-def robot_mjcf(tree: Tree, visuals: list[Visual] = (), mesh_folder: str = "") -> str:
-    """The robot alone as a complete MJCF model; with `visuals`, meshes are looked for in `mesh_folder` (relative to the file)."""
+def robot_mjcf(tree: Tree, visuals: list[Visual] = (), mesh_folder: str = "", digest: int | None = None) -> str:
+    """The robot alone as a complete MJCF model; with `visuals`, meshes are looked for in `mesh_folder` (relative to the file).
+
+    digest: of the robot that this is, if the tree has more spheres than it.
+    """
     root = ElementTree.Element("mujoco", model=tree.name)
     flags = dict.fromkeys(["balanceinertia", "fusestatic", "inertiafromgeom", "autolimits"], "false")
     flags |= dict.fromkeys(["boundmass", "boundinertia"], "0")
     ElementTree.SubElement(root, "compiler", angle="radian", coordinate="local", **flags)
     ElementTree.SubElement(root, "option", gravity=words(tree.gravity), timestep="0.001")
     custom = ElementTree.SubElement(root, "custom")
-    ElementTree.SubElement(custom, "text", name="robot_digest", data=f"0x{tree.digest:016x}")
+    ElementTree.SubElement(custom, "text", name="robot_digest", data=f"0x{tree.digest if digest is None else digest:016x}")
     asset = ElementTree.SubElement(root, "asset")
     for visual in visuals:
         if visual.kind == "mesh":

@@ -45,6 +45,7 @@ def task_header(spec: TaskSpec | MotionSpec) -> str:
         *numbers("p_WO", spec.boxes.p_WO, spec.boxes.name),
         *numbers("R_WO", spec.boxes.R_WO, spec.boxes.name),
         *numbers("half", spec.boxes.half, spec.boxes.name),
+        *(_spheres(spec) if isinstance(spec, MotionSpec) and spec.has_spheres else []),
         "};",
         "",
         "}  // namespace engram::tasks",
@@ -92,6 +93,20 @@ def _motion(spec: MotionSpec) -> list[str]:
             decimal = ", ".join(f"{x:g}" for x in value)
             lines.append(f"  static constexpr double {name}[{len(value)}] = {{{text}}};  // {decimal}")
     return [*lines, ""]
+
+
+def _spheres(spec: MotionSpec) -> list[str]:
+    """The robot's collision spheres and the task's own."""
+    tree = spec.guarded
+    labels = [tree.joint_name[j] for j in tree.sphere_joint]
+    return [
+        "",
+        "  // collision spheres: centre in joint axes [m], radius [m]",
+        f"  static constexpr int nsphere = {len(labels)};",
+        *integers("int", "sphere_joint", tree.sphere_joint),
+        *numbers("p_JS", tree.p_JS, labels),
+        *numbers("sphere_radius", tree.sphere_radius, labels),
+    ]
 
 
 def _scalar(name: str, value: float, unit: str = "") -> list[str]:

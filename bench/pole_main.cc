@@ -1,0 +1,192 @@
+// engram-pole: Talos reaches around the pole, in lock step in this process; one row per motion on standard output.
+//
+//   engram-pole motions=20 seed=1 memory=memory|shift|cold [first=N] [cycles=FILE] [guide=1] [record=FILE]
+//
+// A motion: the hand is brought to a random point on one side of the pole by a guide that knows the way round (`Guide`), then the target goes
+// to a random point on the other side, at once or along a straight line at up to kSpeed, and the controller is on its own for kAlone seconds.
+// Success: the robot stands, the arm never touched the pole, and the hand is within the task's success_position over the last kRest seconds.
+// With `guide=1` the guide leads in both parts: the runs from which the memory learns. record=FILE: one row of doubles per control period
+// of the second part (native byte order): motion, s since the target went, q, v, target (see codegen/engram/learn/pole.py).
+// first=N: motions N, N + 1, ... of the seed's; cycles=FILE: two doubles per control period of the second part, CPU time of the whole and
+// of the memory's answer [us].
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "bench/pole_guided.h"
+#include "bench/stopwatch.h"
+#include "codegen/offline/pole_guide.h"
+#include "tests/support/legged_plant.h"
+
+namespace {
+
+using engram::PoleGuide;
+using engram::test::LeggedController;
+using engram::test::LeggedPlant;
+using Task = engram::tasks::TalosPole;
+
+constexpr double kSettle = 4.0, kAlone = 4.0, kRest = 0.3;  // s, most time to get to the first point; s; s
+constexpr double kSpeed = 0.8;                              // m/s, slowest of a target that moves half of it
+
+struct Motion {
+  double from[3], to[3];  // m, world
+  double speed;           // m/s; 0: the target jumps
+};
+
+// uniform in [lo, hi], the same numbers on every machine
+double uniform(std::mt19937_64& rng, double lo, double hi) { return lo + (hi - lo) * static_cast<double>(rng() >> 11) * 0x1p-53; }
+
+// A point on one side of the pole: left 1, right -1. Out of the pole's way and within reach.
+void draw(std::mt19937_64& rng, int side, double (&p)[3]) {
+  p[0] = uniform(rng, 0.32, 0.45);
+  p[1] = Task::p_WO[0][1] + side * (side > 0 ? uniform(rng, 0.16, 0.32) : uniform(rng, 0.16, 0.28));
+  p[2] = uniform(rng, 0.95, 1.2);
+}
+
+Motion draw(std::mt19937_64& rng) {
+  Motion m;
+  const int side = rng() & 1 ? 1 : -1;
+  draw(rng, side, m.from);
+  draw(rng, -side, m.to);
+  m.speed = rng() & 1 ? uniform(rng, 0.5 * kSpeed, kSpeed) : 0.0;
+  return m;
+}
+
+double distance(const double* a, const double* b) { return std::sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2])); }
+
+bool touches(const LeggedPlant& plant, int pole) {
+  for (int i = 0; i < plant.data()->ncon; ++i) {
+    const mjContact& c = plant.data()->contact[i];
+    if ((c.geom1 == pole || c.geom2 == pole) && c.dist <= 0.0) return true;
+  }
+  return false;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  int motions = 20, first = 0;
+  uint64_t seed = 1;
+  bool guided = false;
+  std::string memory = "memory", record, times;
+  for (int i = 1; i < argc; ++i) {
+    const std::string text = argv[i], key = text.substr(0, text.find('=')), value = text.substr(std::min(text.size(), key.size() + 1));
+    if (key == "motions") motions = std::atoi(value.c_str());
+    else if (key == "seed") seed = std::strtoull(value.c_str(), nullptr, 0);
+    else if (key == "memory") memory = value;
+    else if (key == "first") first = std::atoi(value.c_str());
+    else if (key == "cycles") times = value;
+    else if (key == "guide") guided = value == "1";
+    else if (key == "record") record = value;
+    else bench::fail("usage: engram-pole [motions=N] [seed=S] [memory=memory|shift|cold] [first=I] [cycles=FILE] [guide=1] [record=FILE]");
+  }
+  const engram_model* const kModel = guided ? &engram_talos_pole_guided : &engram_talos_pole;
+  engram_options options;
+  engram_default_options(kModel, &options);
+  options.clock = bench::thread_us;
+  options.memory = memory == "memory" ? ENGRAM_MODE_MEMORY : memory == "shift" ? ENGRAM_MODE_SHIFT : ENGRAM_MODE_COLD;
+  if (options.memory == ENGRAM_MODE_COLD && memory != "cold") bench::fail("engram-pole: memory is one of memory, shift, cold");
+  const auto open = [](const std::string& path) -> std::FILE* {
+    std::FILE* const file = path.empty() ? nullptr : std::fopen(path.c_str(), "wb");
+    if (!path.empty() && file == nullptr) bench::fail("engram-pole: cannot write " + path);
+    return file;
+  };
+  std::FILE *const log = open(record), *const clocked = open(times);
+
+  std::mt19937_64 rng(seed);
+  std::vector<double> cycles, queries;
+  int successes = 0, done = 0;
+  for (int n = 0; n < first + motions; ++n) {
+    const Motion m = draw(rng);
+    if (n < first) continue;
+    LeggedPlant plant(kModel, 0.0);
+    LeggedController controller(kModel, &options);
+    if (controller.error != ENGRAM_NO_ERROR) bench::fail(engram_error_text(controller.error));
+    const int pole = mj_name2id(plant.model(), mjOBJ_GEOM, "pole"), site = mj_name2id(plant.model(), mjOBJ_SITE, "right_gripper");
+    const double* const hand = plant.data()->site_xpos + 3 * site;
+    int32_t jump = 0;
+    bool touched = false, fallen = false;
+    int refused = 0;
+    const auto ask = [&](const double* p, bool fresh) {
+      jump += fresh ? 1 : 0;
+      if (engram_set_task(controller.handle, plant.utime, jump, p, 3) == ENGRAM_BAD_TASK) ++refused;
+    };
+    const auto step = [&] {
+      controller.step(plant);
+      fallen = fallen || !(plant.base_up() > 0.8);
+    };
+    // to the first point
+    PoleGuide guide;
+    const auto lead = [&](const double (&to)[3]) {
+      double p[3];
+      if (guide.lead(hand, to, p)) ask(p, true);
+    };
+    guide.begin();
+    int still = 0;
+    const auto settled = [&] { return still >= 300 && plant.utime % 10000 == 0; };  // the second part begins at a tick
+    while (plant.utime < static_cast<int64_t>(1e6 * kSettle) && !settled() && !fallen) {
+      if (plant.utime % 10000 == 0) lead(m.from);
+      step();
+      still = distance(hand, m.from) < Task::success_position ? still + 1 : 0;
+    }
+    const bool ready = settled();
+    // on its own
+    guide.begin();
+    const int64_t start = plant.utime;
+    const double way = distance(m.from, m.to);
+    double worst = 0.0;
+    int remembered = 0;  // cycles that the memory has won
+    while (ready && plant.utime < start + static_cast<int64_t>(1e6 * kAlone) && !fallen) {
+      const double t = 1e-6 * static_cast<double>(plant.utime - start);
+      if (plant.utime % 10000 == 0) {
+        if (guided) {
+          lead(m.to);
+        } else if (m.speed == 0.0 || t * m.speed >= way) {
+          if (t == 0.0 || m.speed > 0.0) ask(m.to, t == 0.0);
+        } else {
+          double p[3];
+          for (int i = 0; i < 3; ++i) p[i] = m.from[i] + t * m.speed / way * (m.to[i] - m.from[i]);
+          ask(p, t == 0.0);  // those within the pole are refused: the last one stays
+        }
+        if (log != nullptr) {
+          std::vector<double> row = {double(n), t};
+          row.insert(row.end(), plant.q.begin(), plant.q.end());
+          row.insert(row.end(), plant.v.begin(), plant.v.end());
+          row.insert(row.end(), m.to, m.to + 3);
+          std::fwrite(row.data(), sizeof(double), row.size(), log);
+        }
+      }
+      const bool ticked = plant.utime % 10000 == 0;
+      step();
+      if (ticked) {
+        cycles.push_back(controller.cycle().total_us);
+        remembered += controller.cycle().winner == ENGRAM_CANDIDATE_KNN;
+        queries.push_back(controller.cycle().asked_us[ENGRAM_CANDIDATE_KNN]);
+        const double row[2] = {cycles.back(), queries.back()};
+        if (clocked != nullptr) std::fwrite(row, sizeof row, 1, clocked);
+      }
+      touched = touched || touches(plant, pole);
+      if (t > kAlone - kRest) worst = std::max(worst, distance(hand, m.to));
+    }
+    const bool success = ready && !fallen && !touched && worst < Task::success_position;
+    successes += success ? 1 : 0;
+    ++done;
+    std::printf("motion %d side %d speed %.2f ready %d success %d error_m %.4f touched %d fallen %d refused %d remembered %d hand %.3f %.3f %.3f\n", n,
+                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, worst, touched, fallen, refused, remembered, hand[0], hand[1], hand[2]);
+    std::fflush(stdout);
+  }
+  if (log != nullptr) std::fclose(log);
+  if (clocked != nullptr) std::fclose(clocked);
+  const auto share = [](std::vector<double>& us, double s) {
+    std::sort(us.begin(), us.end());
+    return us.empty() ? 0.0 : us[std::min(us.size() - 1, static_cast<size_t>(s * static_cast<double>(us.size())))];
+  };
+  std::printf("total motions %d successes %d cycles %zu p50_us %.0f p99_us %.0f max_us %.0f query_p50_us %.1f query_p99_us %.1f\n", done, successes,
+              cycles.size(), share(cycles, 0.5), share(cycles, 0.99), share(cycles, 1.0), share(queries, 0.5), share(queries, 0.99));
+  return 0;
+}

@@ -1,0 +1,69 @@
+// Talos reaches around a pole: the terms of the hand, and of what keeps it clear. docs/pole.md
+#ifndef CONTROLLER_LOOP_LOOP_TALOS_POLE_H_
+#define CONTROLLER_LOOP_LOOP_TALOS_POLE_H_
+
+#include "controller/loop/loop_pole_memory.h"
+#include "controller/loop/loop_talos.h"
+#include "controller/ocp/ocp_frame_reach.h"
+#include "controller/ocp/ocp_obstacles.h"
+#include "tables/talos_pole/task.h"
+
+namespace engram {
+
+// Stands on both feet; the right hand goes to p_WT, the arm stays clear of the boxes of world.xml.
+struct TalosPole : TalosBody<tasks::TalosPole, 50> {
+  static constexpr bool kReaches = true;
+  static constexpr int kHand = Robot::kRightGripper;
+  using Field = BoxField<Task>;
+  using P = ContactOcp<Soles, StateTerm<Robot>, TorqueTerm<Robot>, LimitTerm<Robot>, ComTerm<Robot>, Swing<0>, Swing<1>, Cone<0>, Cone<1>,
+                       FrameReachTerm<Robot, kHand>, ObstacleTerm<Robot, Field, Task>>;
+  using Gait = TalosStand::Gait;
+
+  static void command(const double* task, LeggedCommand& c) { std::memcpy(c.hand, task, sizeof c.hand); }
+
+  // A hand does not fit where an obstacle is.
+  static bool reachable(const LeggedCommand& c) {
+    Vec3<double> g;
+    for (int i = 0; i < Field::count; ++i)
+      if (!(Field::distance(i, Vec3<double>(c.hand[0], c.hand[1], c.hand[2]), g) >= Task::reach_clearance)) return false;
+    return true;
+  }
+  template <class Knot> static void reach(Knot& k, double weight, const LeggedCommand& c, bool terminal) {
+    k.reach_w = weight * Task::reach_hand * (terminal ? Task::reach_terminal : 1.0);
+    k.reach_near = Task::reach_near;
+    std::memcpy(k.reach_p, c.hand, sizeof c.hand);
+    k.limit_w_v = weight * Task::reach_limit_v;
+    k.limit_w_u = terminal ? 0.0 : weight * Task::reach_limit_u;
+    k.obstacle_w = weight * Task::reach_obstacle;
+    k.obstacle_margin = Task::reach_margin;
+  }
+  // Where the hand is [m], and how it moves [m/s]: world axes.
+  static void hand(const double* x, double (&p)[3]) {
+    double v[3];
+    hand(x, p, v);
+  }
+  static void hand(const double* x, double* p, double* v) {
+    RbdData<Robot, double> d;
+    Mat3<double> R_WF;
+    Vec3<double> at;
+    rbd_kinematics<Robot>(x, d);
+    rbd_velocity<Robot>(x + Robot::nq, d);
+    rbd_frame_placement<Robot>(d, kHand, R_WF, at);
+    const Vec3<double> moves = rbd_point_velocity<Robot>(d, Robot::frame_joint[kHand], at);
+    for (int i = 0; i < 3; ++i) {
+      p[i] = at[i];
+      v[i] = moves[i];
+    }
+  }
+
+  // What the memory moves: driven dofs of the torso and of the right arm.
+  static constexpr int nmoved = 9, moved[nmoved] = {12, 13, 22, 23, 24, 25, 26, 27, 28};
+};
+
+// The same with a memory.
+template <const PoleTables& tables> struct TalosPoleRemembers : TalosPole {
+  using Memory = PoleMemory<TalosPole, P, tables>;
+};
+
+}  // namespace engram
+#endif  // CONTROLLER_LOOP_LOOP_TALOS_POLE_H_

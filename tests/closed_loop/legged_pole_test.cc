@@ -1,0 +1,80 @@
+// link: engram_talos_pole legged_plant
+// Talos in MuJoCo reaches beside a pole; its own problem stops before the pole when the target changes sides; nonsense is refused.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/legged_plant.h"
+
+namespace engram::test {
+namespace {
+
+const engram_model* const kModel = &engram_talos_pole;
+constexpr double kRight[3] = {0.40, -0.53, 1.04}, kLeft[3] = {0.33, -0.06, 1.16}, kWay[3] = {0.12, -0.27, 1.0};
+
+struct PoleTest : testing::Test {
+  LeggedPlant plant{kModel, 0.0};
+  const double* hand() const { return plant.data()->site_xpos + 3 * mj_name2id(plant.model(), mjOBJ_SITE, "right_gripper"); }
+  double away(const double* p) const { return std::hypot(hand()[0] - p[0], hand()[1] - p[1], hand()[2] - p[2]); }
+  bool touches() const {
+    const int pole = mj_name2id(plant.model(), mjOBJ_GEOM, "pole");
+    for (int i = 0; i < plant.data()->ncon; ++i)
+      if (plant.data()->contact[i].geom1 == pole || plant.data()->contact[i].geom2 == pole) return true;
+    return false;
+  }
+  void go(LeggedController& c, const double* target, int jump, int ms) {
+    ASSERT_EQ(engram_set_task(c.handle, plant.utime, jump, target, 3), ENGRAM_CONVERGED);
+    for (int t = 0; t < ms; ++t) {
+      c.step(plant);
+      ASSERT_GT(plant.base_up(), 0.9) << "fallen at " << t << " ms of jump " << jump;
+    }
+  }
+  static engram_options shift_only() {
+    engram_options o;
+    engram_default_options(kModel, &o);
+    o.memory = ENGRAM_MODE_SHIFT;
+    return o;
+  }
+};
+
+TEST_F(PoleTest, ReachesBesideThePoleAndAroundItByAWayPoint) {
+  const engram_options o = shift_only();
+  LeggedController c(kModel, &o);
+  ASSERT_EQ(c.error, ENGRAM_NO_ERROR);
+  go(c, kRight, 1, 2500);
+  EXPECT_LT(away(kRight), 0.02);  // m; posture pulls against the target
+  go(c, kWay, 2, 1000);
+  go(c, kLeft, 3, 2500);
+  EXPECT_LT(away(kLeft), 0.02);
+  EXPECT_FALSE(touches());
+}
+
+// The failure that the memory is for (thesis 8.1): the plan ends in front of the pole, and its shift does so too.
+TEST_F(PoleTest, ThePlanAloneStopsBeforeThePole) {
+  const engram_options o = shift_only();
+  LeggedController c(kModel, &o);
+  go(c, kRight, 1, 2500);
+  go(c, kLeft, 2, 4000);
+  EXPECT_GT(away(kLeft), 0.1);
+}
+
+TEST_F(PoleTest, WithItsMemoryItGoesAround) {
+  LeggedController c(kModel);
+  go(c, kRight, 1, 2500);
+  go(c, kLeft, 2, 4000);
+  EXPECT_LT(away(kLeft), 0.03);  // m, success_position of the task
+  EXPECT_FALSE(touches());
+}
+
+TEST_F(PoleTest, TargetsInThePoleAndOutOfReachAreRefused) {
+  LeggedController c(kModel);
+  const double inside[3] = {0.34, -0.27, 1.0}, far[3] = {1.5, 0.0, 1.0}, odd[3] = {0.3, NAN, 1.0};
+  EXPECT_EQ(engram_set_task(c.handle, 0, 1, inside, 3), ENGRAM_BAD_TASK);
+  EXPECT_EQ(engram_set_task(c.handle, 0, 1, far, 3), ENGRAM_BAD_TASK);
+  EXPECT_EQ(engram_set_task(c.handle, 0, 1, odd, 3), ENGRAM_BAD_TASK);
+  EXPECT_EQ(engram_set_task(c.handle, 0, 1, kRight, 2), ENGRAM_BAD_TASK);
+  EXPECT_EQ(engram_set_task(c.handle, 0, 1, kRight, 3), ENGRAM_CONVERGED);
+}
+
+}  // namespace
+}  // namespace engram::test
