@@ -17,7 +17,7 @@ from engram_sim.motion import Motion
 from engram_sim.pair import Pair, Progress, plant_option, private_port, scene
 from engram_sim.results import Run, read_run, wilson
 
-MODE = "shift"  # what seeds the solver: the shifted plan
+MODE = "memory"  # what seeds the solver: the shifted plan, and a memory where the robot has one for the task
 LOG_EVERY = 40  # plant steps between two states of the log
 LOG_FULL = 10.0  # s of the log with every state
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}

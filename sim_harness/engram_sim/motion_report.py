@@ -85,7 +85,7 @@ def write(folder: Path, motion: Motion, done: list[dict[str, Any]], summary: dic
 <title>Engram: {robot} {task}</title><style>{CSS}</style></head><body><main>
 <h1>Engram: {robot} {task}</h1>
 <p class="lead">The deployed controller over LCM, seed {summary["seed"]}. {CLOCK[summary["clock"]]} at 1 kHz, planned at 100 Hz,
-warm-started by its own shifted plan alone.</p>
+warm-started by its own shifted plan, and by a memory where there is one for the task.</p>
 {shown}<div class="cards">{boxes}</div>
 <h2>The script, part by part</h2>{html_table(table(done))}
 <h2>Time</h2>{times_table(summary)}

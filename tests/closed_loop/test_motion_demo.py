@@ -25,12 +25,12 @@ def test_files(demo: Path) -> None:
     for name in ("series.txt", "summary.json", "report.html", "demo.mp4", "demo.png"):
         assert (demo / name).stat().st_size > 0, name
     for name in ("run.lcm", "results.json", "timing.csv", "pair.json"):
-        assert (demo / "shift" / name).stat().st_size > 0, name
+        assert (demo / "memory" / name).stat().st_size > 0, name
 
 
 def test_summary_and_figures_agree_with_results(demo: Path) -> None:
     summary = json.loads((demo / "summary.json").read_text())
-    jumps = json.loads((demo / "shift" / "results.json").read_text())["jumps"]
+    jumps = json.loads((demo / "memory" / "results.json").read_text())["jumps"]
     assert (summary["robot"], summary["task"], summary["seed"], summary["parts"]) == ("hector", "fly", 11, POINTS)
     assert summary["successes"] == sum(jump["success"] for jump in jumps) == POINTS
     assert summary["torque_share_max"] == max(jump["torque_share"] for jump in jumps) <= 1.0
@@ -47,7 +47,7 @@ def test_report_stands_alone(demo: Path) -> None:
 
 
 def test_replay_gives_the_same_messages(demo: Path, capsys: pytest.CaptureFixture) -> None:
-    assert main(["replay", str(demo / "shift" / "run.lcm"), "--limit", "2"]) == 0
+    assert main(["replay", str(demo / "memory" / "run.lcm"), "--limit", "2"]) == 0
     assert "are the same, byte for byte" in capsys.readouterr().out
 
 

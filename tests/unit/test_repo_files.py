@@ -10,7 +10,7 @@ from pathlib import Path
 
 LARGEST_FILE = 4_000_000  # bytes: sources, tables and golden text only
 LARGEST_TABLES = (
-    3_200_000  # bytes: all generated tables together: memories of the arm (2 MB) and of walking (1 MB), robots and tasks
+    3_450_000  # bytes of all generated tables: memories of the arm (2 MB), of walking (1 MB), of the pole; robots and tasks
 )
 LONGEST_SOURCE = 520  # lines: a file is read in one sitting; 500 and a little slack
 MARKS = re.compile(r"\b(" + "|".join(["TO" + "DO", "FIX" + "ME", "XX" + "X", "HA" + "CK", "NotImplemented" + "Error"]) + r")\b")
