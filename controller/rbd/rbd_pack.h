@@ -19,8 +19,13 @@
 
 // For arithmetic of a few instructions. In long translation units GCC stops inlining what is merely `inline`, and a call costs more
 // than the arithmetic (forward kinematics: 2.5 times as long).
+#ifdef __SANITIZE_ADDRESS__  // checks of every access make functions that are inlined by force take minutes to compile
+#define ENGRAM_INLINE inline
+#define ENGRAM_INLINE_LAMBDA
+#else
 #define ENGRAM_INLINE inline __attribute__((always_inline))
 #define ENGRAM_INLINE_LAMBDA __attribute__((always_inline))
+#endif
 
 namespace engram {
 
