@@ -44,7 +44,8 @@ STUDIES = {
                  Recipe(points=(40, 30), rank=16, scale=3.0, enrich=16, sweeps=1, seeds=24, starts=6000, start_cost=0.13,
                         start_evaluations=500, spread=True, evaluations=120), 200, 400, slice(3, 10)),
     "6.5": Study("panda.pick", "pick and place, Panda with table, box and shelf, d = 62 (table 7.3)",
-                 Recipe(points=(30, 24), rank=10, scale=3.0, enrich=6, sweeps=2, seeds=2, starts=3000, evaluations=300), 50, 100,
+                 Recipe(points=(30, 24), rank=16, scale=3.0, enrich=16, sweeps=1, seeds=6, spread=True, starts=12000,
+                        start_cost=0.16, start_evaluations=800, evaluations=800), 50, 100,
                  slice(6, 20)),
 }  # fmt: skip
 
