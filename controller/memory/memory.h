@@ -73,7 +73,9 @@ template <class Task> struct Guess {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots;
   GuessKind kind;
-  int32_t source;  // neighbour: index of its sample; mixture: of its component; network: of its member or mode; train: its rank by cost; line, regression: 0 best neighbour's end, 1 found from home, 2 from here
+  // neighbour: index of its sample; mixture: of its component; network: of its member or mode; train: its rank by cost;
+  // line, regression: 0 best neighbour's end, 1 found from home, 2 from here
+  int32_t source;
   double trust;    // [0, 1] estimated probability that the solver succeeds from here
   double warp;     // [rad] largest joint difference between its end and where inverse kinematics started
   double x[N + 1][R::nq + R::nv];  // states at the knots; x[0] is the measured state

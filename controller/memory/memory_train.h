@@ -33,7 +33,7 @@ template <class Task> struct MemoryTrain {
 namespace memory {
 
 // (|p_WF - p_WT| / 0.05 + (3 - tr(R_WT' R_WF)) / 4 / 0.2 + max(0, 0.02 - clearance) / 0.01) / 3 at q (nq): as the train's density
-// weighs them.
+// weighs them (codegen/offline/study_pose.h), but of the spheres the nearest alone counts, linearly.
 template <class Task, class S> S posture_cost(const ReachTarget& goal, const S* q) {
   Mat3<S> R_WF;
   Vec3<S> p_WF;
