@@ -5,9 +5,12 @@
 #include "controller/memory/step_memory.h"
 #include "tables/talos_step/task.h"
 
+#include <nanobind/stl/optional.h>
+
 #include <algorithm>
 #include <ctime>
 #include <memory>
+#include <optional>
 
 namespace engram::binding {
 namespace {
@@ -31,11 +34,14 @@ class StepMemory {
     if (step_check<Task>(tables_, text) != kTabOk) throw nb::value_error(text);
   }
 
-  nb::dict query(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0) {
-    if (!ask(feet, goal, foot, x0)) throw nb::value_error("feet, goal or x0: not finite");
-    NewArray xs({N + 1, nx}), us({N, nu});
-    std::copy_n(guess_->x[0], (N + 1) * nx, xs.data());
-    std::copy_n(guess_->u[0], N * nu, us.data());
+  nb::dict query(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0, const std::optional<In<1>>& previous,
+                 const std::optional<In<1>>& next, int at) {
+    const StepTask task = task_of(feet, goal, foot, previous, next);
+    ask(task, at < 0 ? step_first<Task>(task) : at, x0);
+    const std::size_t n = guess_->last - guess_->first;
+    NewArray xs({n + 1, nx}), us({n, nu});
+    std::copy_n(guess_->x[guess_->first], (n + 1) * nx, xs.data());
+    std::copy_n(guess_->u[guess_->first], n * nu, us.data());
     nb::dict result;
     result["xs"] = xs.release();
     result["us"] = us.release();
@@ -46,10 +52,11 @@ class StepMemory {
 
   // Processor time [us] of each of n queries.
   Out query_us(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0, int n) {
+    const StepTask task = task_of(feet, goal, foot, {}, {});
     NewArray us({std::size_t(n)});
     for (int i = 0; i < n; ++i) {
       const double start = thread_us();
-      ask(feet, goal, foot, x0);
+      ask(task, 0, x0);
       us.data()[i] = thread_us() - start;
     }
     return us.release();
@@ -62,15 +69,32 @@ class StepMemory {
     return 1e6 * double(t.tv_sec) + 1e-3 * double(t.tv_nsec);
   }
 
-  bool ask(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0) {
+  static StepTask task_of(const In<2>& feet, const In<1>& goal, int foot, const std::optional<In<1>>& previous,
+                          const std::optional<In<1>>& next) {
     check_shape<2>("feet", feet, {2, 3});
     check_shape<1>("goal", goal, {3});
-    check_shape<1>("x0", x0, {nx});
     if (foot != 0 && foot != 1) throw nb::value_error("foot: expected 0 (left) or 1 (right)");
-    double start[2][3], end[3];
-    std::copy_n(feet.data(), 6, start[0]);
-    std::copy_n(goal.data(), 3, end);
-    return step_query<Task, TalosMirror>(tables_, start, end, foot, x0.data(), *work_, *guess_);
+    StepTask task;
+    std::copy_n(feet.data(), 6, task.feet[0]);
+    std::copy_n(goal.data(), 3, task.goal);
+    task.foot = foot;
+    if (previous) {
+      check_shape<1>("previous", *previous, {3});
+      task.from_walk = true;
+      std::copy_n(previous->data(), 3, task.previous);
+    }
+    if (next) {
+      check_shape<1>("next", *next, {3});
+      task.into_walk = true;
+      std::copy_n(next->data(), 3, task.next);
+    }
+    return task;
+  }
+
+  void ask(const StepTask& task, int at, const In<1>& x0) {
+    check_shape<1>("x0", x0, {nx});
+    if (!step_query<Task, TalosMirror>(tables_, task, at, x0.data(), *work_, *guess_))
+      throw nb::value_error("feet, goal or x0: not finite, or `at` is not a knot of the step");
   }
 
   HeldTable left_, right_, path_, torque_;
@@ -85,8 +109,9 @@ void bind_step_memory(nb::module_& engine) {
   using namespace nb::literals;
   nb::class_<StepMemory>(engine, "TalosStepMemory", "The memory of steps on tables of engram.emit.kinds: regressions, path and torque bases.")
       .def(nb::init<const nb::object&, const nb::object&, const nb::object&, const nb::object&>(), "left"_a, "right"_a, "path"_a, "torque"_a)
-      .def("query", &StepMemory::query, "feet"_a, "goal"_a, "foot"_a, "x0"_a,
-           "A guess xs (T + 1, nx), us (T, nu) of the step of `foot` from feet (2, 3) to goal (3), from x0; status, deviation.")
+      .def("query", &StepMemory::query, "feet"_a, "goal"_a, "foot"_a, "x0"_a, "previous"_a = nb::none(), "next"_a = nb::none(), "at"_a = -1,
+           "A guess xs (T + 1, nx), us (T, nu) of the step of `foot` from feet (2, 3) to goal (3), from x0 at its knot `at` (-1: its first); "
+           "status, deviation. previous, next: poses (3) of the standing foot before and after, within a walk.")
       .def("query_us", &StepMemory::query_us, "feet"_a, "goal"_a, "foot"_a, "x0"_a, "n"_a, "Processor times [us] of n queries.");
   nb::list other, sign;
   for (int i = 0; i < TalosMirror::nu; ++i) {

@@ -1,5 +1,8 @@
 // The memory of steps: where both feet stand and where one of them goes in, a guess of the optimal step (xs, us) out.
 //
+//   StepTask     one step, poses of feet in any one frame of the ground: alone, or within a walk (from_walk, into_walk)
+//   step_query   its knots step_first .. step_last, or from a later one on; asked when a step enters the horizon, from the plan's last state
+//
 //   feet, goal -> six numbers: start and goal of the foot that swings, in the axes of the one that stands, mirrored if it is the right one
 //              -> z by regression, one for each foot -> dq(t) = q(t) (-) q(0), u(t) by PCA, one for both feet
 //              -> q = q0 (+) dq,  v_{k+1} = (q_{k+1} (-) q_k) / dt as the integrator has it: gaps are left in v alone
@@ -26,12 +29,34 @@ struct StepTables {
 
 inline constexpr int kStepFeatures = 6, kStepMaxCoefficients = 192;
 
+inline constexpr int kStepBetween = 4;  // knots on both feet between two swings of a walk; a step has half of them at either end
+
+// A step. Poses (x, y, yaw) [m, rad] in any one frame of the ground.
+struct StepTask {
+  double feet[2][3];            // left and right at its beginning
+  double goal[3];               // where `foot` goes
+  int foot = 0;                 // that swings: 0 left, 1 right
+  bool from_walk = false;       // another step came before; or the robot is at rest
+  bool into_walk = false;       // another step comes after; or the robot comes to rest
+  double previous[3] = {};      // from_walk: where the foot that stands now stood before it swung
+  double next[3] = {};          // into_walk: where the foot that stands now goes in the step after
+};
+
+// The first knot of a step, and the last, where the one after begins: of Task::nknots from rest to rest, those about its swing in a walk.
+template <class Task> constexpr int step_first(const StepTask& t) {
+  return t.from_walk ? static_cast<int>(Task::gait_before) - kStepBetween / 2 : 0;
+}
+template <class Task> constexpr int step_last(const StepTask& t) {
+  return t.into_walk ? static_cast<int>(Task::gait_before + Task::gait_swing) + kStepBetween / 2 : Task::nknots;
+}
+
 // Task: tables/<robot>_<task>/task.h; Mirror: which driven dof takes which other one's place, and its sign, seen in a mirror.
 template <class Task> struct StepGuess {
   using R = typename Task::Robot;
   static constexpr int N = Task::nknots;
-  double x[N + 1][R::nq + R::nv];  // x[0] is the measured state
+  double x[N + 1][R::nq + R::nv];  // x[first] is the state that was given
   double u[N][R::nu];
+  int first, last;    // knots of x that are filled; of u all but the last
   TabStatus status;   // kTabOutside: the task lies outside what was learnt
   double deviation;   // of the regression, relative to its prior: 0 (known) .. 1 (unknown)
 };
@@ -70,11 +95,10 @@ template <class Task> TabStatus step_check(const StepTables& tables, char* text)
   return kTabBad;
 }
 
-// feet, goal: (x, y, yaw) [m, rad] in any frame of the ground; foot: 0 left, 1 right, which goes to `goal`.
-inline void step_features(const double (&feet)[2][3], const double (&goal)[3], int foot, double (&x)[kStepFeatures]) {
-  const double* const stands = feet[1 - foot];
-  const double c = std::cos(stands[2]), s = std::sin(stands[2]), mirror = foot == 0 ? 1.0 : -1.0;
-  const double* const seen[2] = {feet[foot], goal};
+inline void step_features(const StepTask& t, double (&x)[kStepFeatures]) {
+  const double* const stands = t.feet[1 - t.foot];
+  const double c = std::cos(stands[2]), s = std::sin(stands[2]), mirror = t.foot == 0 ? 1.0 : -1.0;
+  const double* const seen[2] = {t.feet[t.foot], t.goal};
   for (int i = 0; i < 2; ++i) {
     const double dx = seen[i][0] - stands[0], dy = seen[i][1] - stands[1];
     x[3 * i] = c * dx + s * dy;
@@ -83,33 +107,40 @@ inline void step_features(const double (&feet)[2][3], const double (&goal)[3], i
   }
 }
 
-// The guess from x0 (nq + nv), which stands on the feet. False if a number is not finite: no guess.
+// The guess from knot `at` of the step on, where the robot has the state x0 (nq + nv): measured, or the last of the plan that is continued.
+// False if a number is not finite or `at` is no knot of the step before its last: no guess.
 template <class Task, class Mirror>
-bool step_query(const StepTables& tables, const double (&feet)[2][3], const double (&goal)[3], int foot, const double* x0, StepWork<Task>& w,
-                StepGuess<Task>& guess) {
+bool step_query(const StepTables& tables, const StepTask& task, int at, const double* x0, StepWork<Task>& w, StepGuess<Task>& guess) {
   using R = typename Task::Robot;
-  constexpr int N = Task::nknots, nq = R::nq, nv = R::nv, nu = R::nu, base = nv - nu;
+  constexpr int nq = R::nq, nv = R::nv, nu = R::nu, base = nv - nu;
   static_assert(base == 6 && Mirror::nu == nu, "a free base and driven joints");
+  guess.first = at;
+  guess.last = step_last<Task>(task);
+  if (at < step_first<Task>(task) || at >= guess.last) return false;
   double features[kStepFeatures];
-  step_features(feet, goal, foot, features);
+  step_features(task, features);
   for (int i = 0; i < nq + nv; ++i)
     if (!std::isfinite(x0[i])) return false;
   float variance;
+  const int foot = task.foot;
   const TabGpr& regression = *tables.regression[foot];
   guess.status = tab_gpr_query(&regression, features, w.z, &variance);
   if (guess.status == kTabNotFinite) return false;
+  if (task.from_walk || task.into_walk) guess.status = kTabOutside;  // the tables know steps from rest to rest
   guess.deviation = std::sqrt(variance / (regression.variance + regression.noise));
   tab_pca_decode(tables.path, w.z, w.path);
   tab_pca_decode(tables.torque, w.z + tables.path->m, w.torque);
 
-  std::memcpy(guess.x[0], x0, sizeof(guess.x[0]));
-  for (int k = 0; k < N; ++k) {
+  std::memcpy(guess.x[at], x0, sizeof(guess.x[at]));
+  for (int k = at; k < guess.last; ++k) {
     const float* const dq = w.path + k * nv;
+    const float* const start = w.path + (at - 1) * nv;
     const float* const u = w.torque + k * nu;
+    const auto moved_by = [&](int i) { return at > 0 ? dq[i] - start[i] : dq[i]; };
     double step[nv], moved[nv];
-    for (int i = 0; i < base; ++i) step[i] = foot == 0 ? dq[i] : Mirror::base[i] * dq[i];
+    for (int i = 0; i < base; ++i) step[i] = foot == 0 ? moved_by(i) : Mirror::base[i] * moved_by(i);
     for (int i = 0; i < nu; ++i) {
-      step[base + i] = foot == 0 ? dq[base + i] : Mirror::sign[i] * dq[base + Mirror::other[i]];
+      step[base + i] = foot == 0 ? moved_by(base + i) : Mirror::sign[i] * moved_by(base + Mirror::other[i]);
       guess.u[k][i] = foot == 0 ? u[i] : Mirror::sign[i] * u[Mirror::other[i]];
     }
     rbd_integrate<R>(x0, step, guess.x[k + 1]);

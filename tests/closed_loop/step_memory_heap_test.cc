@@ -18,13 +18,13 @@ using Task = tasks::TalosStep;
 
 TEST(StepMemory, AsksForNoHeap) {
   const StepTables tables = {{&talos_step_left_v1, &talos_step_right_v1}, &talos_step_path_v1, &talos_step_torque_v1};
-  const double feet[2][3] = {{0.02, 0.09, 0.05}, {-0.02, -0.09, -0.05}}, goal[3] = {0.2, 0.1, 0.1};
+  const StepTask task = {{{0.02, 0.09, 0.05}, {-0.02, -0.09, -0.05}}, {0.2, 0.1, 0.1}};
   double x0[Task::Robot::nq + Task::Robot::nv] = {};
   std::memcpy(x0, Task::Robot::q_home, sizeof(Task::Robot::q_home));
   const auto work = std::make_unique<StepWork<Task>>();
   const auto guess = std::make_unique<StepGuess<Task>>();
   counting = true;
-  const bool found = step_query<Task, TalosMirror>(tables, feet, goal, 0, x0, *work, *guess);
+  const bool found = step_query<Task, TalosMirror>(tables, task, 0, x0, *work, *guess);
   counting = false;
   EXPECT_TRUE(found);
   EXPECT_EQ(calls, 0);

@@ -19,13 +19,14 @@ constexpr int nq = R::nq, nv = R::nv, nu = R::nu;
 const StepTables kTables = {{&talos_step_left_v1, &talos_step_right_v1}, &talos_step_path_v1, &talos_step_torque_v1};
 
 struct Query {
-  double feet[2][3] = {{0.02, 0.09, 0.05}, {-0.02, -0.09, -0.05}}, goal[3] = {0.2, 0.1, 0.1}, x0[nq + nv] = {};
-  int foot = 0;
+  StepTask task = {{{0.02, 0.09, 0.05}, {-0.02, -0.09, -0.05}}, {0.2, 0.1, 0.1}};
+  int at = 0;
+  double x0[nq + nv] = {};
   std::unique_ptr<StepWork<Task>> work = std::make_unique<StepWork<Task>>();
   std::unique_ptr<StepGuess<Task>> guess = std::make_unique<StepGuess<Task>>();
 
   Query() { std::memcpy(x0, R::q_home, sizeof(R::q_home)); }
-  bool ask(const StepTables& tables = kTables) { return step_query<Task, TalosMirror>(tables, feet, goal, foot, x0, *work, *guess); }
+  bool ask(const StepTables& tables = kTables) { return step_query<Task, TalosMirror>(tables, task, at, x0, *work, *guess); }
 };
 
 TEST(StepMemory, TheTablesOfTheTreeFit) {
@@ -61,8 +62,8 @@ TEST(StepMemory, FramesDoNotMatter) {
     p[1] = -1.0 + s * x + c * y;
     p[2] += 2.0;
   };
-  for (auto& foot : there.feet) move(foot);
-  move(there.goal);
+  for (auto& foot : there.task.feet) move(foot);
+  move(there.task.goal);
   ASSERT_TRUE(here.ask() && there.ask());
   for (int k = 0; k < Task::nknots; ++k)
     for (int i = 0; i < nu; ++i) EXPECT_NEAR(here.guess->u[k][i], there.guess->u[k][i], 1e-3);  // features are floats
@@ -71,10 +72,10 @@ TEST(StepMemory, FramesDoNotMatter) {
 // Talos' halves differ by some grams: the torques of a mirrored step by less than 3 N m of some hundred.
 TEST(StepMemory, TheRightFootMirrorsTheLeft) {
   Query left, right;
-  right.foot = 1;
+  right.task.foot = 1;
   for (int f = 0; f < 2; ++f)
-    for (int i = 0; i < 3; ++i) right.feet[f][i] = (i == 0 ? 1.0 : -1.0) * left.feet[1 - f][i];
-  for (int i = 1; i < 3; ++i) right.goal[i] = -left.goal[i];
+    for (int i = 0; i < 3; ++i) right.task.feet[f][i] = (i == 0 ? 1.0 : -1.0) * left.task.feet[1 - f][i];
+  for (int i = 1; i < 3; ++i) right.task.goal[i] = -left.task.goal[i];
   ASSERT_TRUE(left.ask() && right.ask());
   double largest = 0.0;
   for (int k = 0; k < Task::nknots; ++k)
@@ -87,7 +88,7 @@ TEST(StepMemory, TheRightFootMirrorsTheLeft) {
 
 TEST(StepMemory, FarTasksAreSaidToBeFar) {
   Query q;
-  q.goal[0] = 0.8;
+  q.task.goal[0] = 0.8;
   ASSERT_TRUE(q.ask());
   EXPECT_EQ(q.guess->status, kTabOutside);
   EXPECT_GT(q.guess->deviation, 0.5);
@@ -95,10 +96,30 @@ TEST(StepMemory, FarTasksAreSaidToBeFar) {
 
 TEST(StepMemory, WhatIsNotFiniteGivesNoGuess) {
   Query q;
-  q.goal[1] = NAN;
+  q.task.goal[1] = NAN;
   EXPECT_FALSE(q.ask());
   q = Query();
   q.x0[nq] = HUGE_VAL;
+  EXPECT_FALSE(q.ask());
+}
+
+TEST(StepMemory, AStepOfAWalkIsShorterAndMayBeAskedFromAnyKnot) {
+  Query q;
+  EXPECT_EQ(step_first<Task>(q.task), 0);
+  EXPECT_EQ(step_last<Task>(q.task), Task::nknots);
+  q.task.from_walk = q.task.into_walk = true;
+  const double stood[3] = {-0.2, -0.09, -0.05}, goes[3] = {0.4, -0.09, 0.1};
+  std::memcpy(q.task.previous, stood, sizeof(stood));
+  std::memcpy(q.task.next, goes, sizeof(goes));
+  EXPECT_EQ(step_last<Task>(q.task) - step_first<Task>(q.task), Task::gait_swing + kStepBetween);
+  EXPECT_FALSE(q.ask());  // knot 0 is not one of its knots
+  for (q.at = step_first<Task>(q.task); q.at < step_last<Task>(q.task); q.at += 5) {
+    ASSERT_TRUE(q.ask());
+    EXPECT_EQ(q.guess->first, q.at);
+    EXPECT_EQ(q.guess->last, step_last<Task>(q.task));
+    EXPECT_EQ(std::memcmp(q.guess->x[q.at], q.x0, sizeof(q.x0)), 0);
+  }
+  q.at = step_last<Task>(q.task);
   EXPECT_FALSE(q.ask());
 }
 
