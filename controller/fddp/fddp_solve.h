@@ -121,10 +121,12 @@ FddpStatus fddp_solve(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, 
   return stats.status = FddpStatus::kIterationLimit;
 }
 
-// Before the state: direction and gains at the trajectory in s. kIterationLimit means ready.
+// Before the state: direction and gains at the trajectory in s. kIterationLimit means ready; after any other status nothing is to be
+// rolled out. kBadHorizon: fddp_check(h).text says why.
 template <class P, int N>
 FddpStatus fddp_prepare(const Horizon<P, N>& h, const FddpOpts& opts, FddpWork<P, N>& w, FddpSolution<P, N>& s, FddpStats& stats) {
   fddp_start(opts, w, stats);
+  if (fddp_check(h).text) return stats.status = FddpStatus::kBadHorizon;
   return stats.status = fddp_direction(h, opts, true, w, s, stats);
 }
 

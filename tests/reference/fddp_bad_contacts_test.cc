@@ -1,5 +1,6 @@
 // options: -O1
-// Contacts that cannot hold end as a status, never as a number that is none.
+// Contacts that cannot hold end as a status, never as a number that is none. Those that can: the same bits by any number of threads.
+#include "bench/thread_pool.h"
 #include "controller/fddp/fddp_solve.h"
 #include "controller/ocp/ocp_contact.h"
 #include "controller/ocp/ocp_frame.h"
@@ -9,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstring>
 #include <memory>
 
 namespace engram {
@@ -90,6 +92,42 @@ TEST(FddpBadContacts, NoNumberIsAStatus) {
     auto c = std::make_unique<Case>(5u);
     (place == 0 ? c->h.x0[3] : place == 1 ? c->h.knot[2].state_ref[9] : c->s.u[1][0]) = NAN;
     EXPECT_EQ(c->solve(), FddpStatus::kNotFinite);
+  }
+}
+
+// Stance on two feet, a touch-down, stance on one: every byte of model, gaps, cost and solution.
+TEST(FddpContacts, ThreadsGiveTheSameBits) {
+  const auto start = [] {
+    auto c = std::make_unique<Case>(5u);
+    for (int k = 0; k < N; ++k) {
+      for (int i = 0; i < P::nu; ++i) c->s.u[k][i] = std::sin(1.0 + 2.3 * i + k);
+      if (k > 4) c->h.phase[k] = 1u;
+    }
+    c->h.phase[4] = kImpact | 5u;
+    c->h.knot[4].dt = 0.0;
+    std::memset(static_cast<void*>(&c->w), 0, sizeof(c->w));
+    fddp_start(FddpOpts{}, c->w, c->stats);
+    return c;
+  };
+  const auto one = start();
+  ASSERT_TRUE(fddp_linearize(one->h, one->s, one->w));
+  FddpOpts opts;
+  opts.iterations = 10;
+  const auto one_solved = start();
+  ASSERT_EQ(fddp_solve(one_solved->h, opts, one_solved->w, one_solved->s, one_solved->stats), FddpStatus::kIterationLimit);
+  EXPECT_GT(one_solved->stats.last().step_length, 0.0);  // it moves
+  for (int threads : {2, 3}) {
+    bench::ThreadPool pool(threads);
+    const auto scratch = std::make_unique<P::Lanes[]>(threads - 1);
+    const auto more = start(), solved = start();
+    more->w.more_lanes = solved->w.more_lanes = scratch.get();
+    ASSERT_TRUE(fddp_linearize(more->h, more->s, more->w, pool.threads()));
+    EXPECT_EQ(std::memcmp(more->w.model, one->w.model, sizeof(one->w.model)), 0) << threads;
+    EXPECT_EQ(std::memcmp(more->w.f, one->w.f, sizeof(one->w.f)), 0) << threads;
+    EXPECT_EQ(std::memcmp(&more->w.cost, &one->w.cost, sizeof(double)), 0) << threads;
+    opts.threads = pool.threads();
+    ASSERT_EQ(fddp_solve(solved->h, opts, solved->w, solved->s, solved->stats), FddpStatus::kIterationLimit);
+    EXPECT_EQ(std::memcmp(&solved->s, &one_solved->s, sizeof(solved->s)), 0) << threads;
   }
 }
 

@@ -25,6 +25,7 @@ struct Case {
     bench::arm_cold_start(h, s);
   }
   FddpStatus solve() { return fddp_solve(h, opts, w, s, stats); }
+  FddpStatus prepare() { return fddp_prepare(h, opts, w, s, stats); }
 };
 
 // The same solver object serves every length, in any order; what is beyond the horizon is not looked at.
@@ -48,6 +49,8 @@ TEST(FddpHorizon, OneThatIsTooLongIsRefused) {
     c->h.n = T;
     EXPECT_EQ(c->solve(), FddpStatus::kBadHorizon);
     EXPECT_EQ(c->stats.iterations, 0);
+    EXPECT_EQ(c->prepare(), FddpStatus::kBadHorizon);
+    EXPECT_EQ(c->stats.status, FddpStatus::kBadHorizon);
   }
   auto c = std::make_unique<Case>();
   c->h.n = N + 1;
@@ -59,11 +62,16 @@ TEST(FddpHorizon, APhaseOfNoLengthIsRefused) {
     auto c = std::make_unique<Case>();
     c->h.knot[7].dt = dt;
     EXPECT_EQ(c->solve(), FddpStatus::kBadHorizon);
+    const auto before = std::make_unique<FddpSolution<Arm, N>>(c->s);
+    EXPECT_EQ(c->prepare(), FddpStatus::kBadHorizon);
+    EXPECT_EQ(std::memcmp(&c->s, before.get(), sizeof(c->s)), 0);  // the solution is unchanged
     const FddpHorizonError error = fddp_check(c->h);
     EXPECT_EQ(error.knot, 7);
     EXPECT_NE(std::strstr(error.text, "a phase of no length; give the knot dt > 0"), nullptr);
   }
-  EXPECT_EQ(fddp_check(std::make_unique<Case>()->h).text, nullptr);
+  auto whole = std::make_unique<Case>();
+  EXPECT_EQ(fddp_check(whole->h).text, nullptr);
+  EXPECT_EQ(whole->prepare(), FddpStatus::kIterationLimit);
 }
 
 TEST(FddpHorizon, ThreadsGiveTheSameBits) {
