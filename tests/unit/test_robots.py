@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,12 +13,13 @@ import pinocchio as pin
 import pytest
 
 from engram.cli import main
+from engram.inputs import InputError
 from engram.paths import ROOT
 from engram.robots.emit_header import c_double, robot_header
 from engram.robots.emit_mjcf import robot_mjcf
 from engram.robots.linear3 import principal_axes, turn_to
 from engram.robots.spec import known_robots, read_spec
-from engram.robots.tree import FREE, PRISMATIC, REVOLUTE, build, load, q_from_pin, q_to_pin
+from engram.robots.tree import FREE, PRISMATIC, REVOLUTE, build, check, load, q_from_pin, q_to_pin
 
 ZOO = ROOT / "tests" / "reference" / "zoo"
 THRUSTER = """[thruster.jet]
@@ -29,6 +31,14 @@ u_lo = 0.5
 u_hi = 4.0
 
 """
+TEXT = (ZOO / "robot.toml").read_text(encoding="utf-8")
+JOINTS = re.findall(r'joint name="(\w+)" type="(?!fixed)', (ZOO / "zoo.urdf").read_text(encoding="utf-8"))
+
+
+def thruster(old: str, new: str) -> str:
+    """A spoilt thruster, before the spheres."""
+    assert old in THRUSTER
+    return THRUSTER.replace(old, new) + "[spheres]"
 
 
 @pytest.fixture()
@@ -221,58 +231,223 @@ def test_meshes_are_written_and_found(tmp_path):
     assert len(colours) > 2  # the parts of the arm kept their colours
 
 
+# id: (what stands there, what is put in its place, the end of the message as a pattern)
 WRONG = {
-    "unknown key": ("free_base", "fre_base", r"robot\.toml:3: fre_base: unknown key; did you mean 'free_base'\?"),
-    "missing key": ("home = {", "gravity = [0, 0, -1]\n# {", r"key 'home' is missing"),
-    "broken TOML": ("armature = 0.05", "armature = = 1", r"not valid TOML.*line 4"),
-    "not a number": ("armature = 0.05", 'armature = "much"', r"robot\.toml:4: armature: expected numbers"),
-    "not finite": ("armature = 0.05", "armature = nan", r"robot\.toml:4: armature: every number must be finite"),
-    "missing URDF": ('"zoo.urdf"', '"zo.urdf"', r"robot\.toml:2: urdf: no URDF at .*zo\.urdf; correct the path"),
-    "two sources": ("free_base", 'example_robot_data = "panda"\nfree_base', r"exactly one of 'urdf'"),
-    "unknown joint": ("welded = 0.7", "wheld = 0.7", r"robot\.toml:8: wheld: zoo\.urdf has no such joint; did you mean"),
-    "unknown frame": ('"tip_link"', '"tap_link"', r"robot\.toml:15: tip: zoo\.urdf has no frame 'tap_link'; did you mean"),
+    # of the file
+    "unknown key": ("free_base", "fre_base", r":3: fre_base: unknown key; did you mean 'free_base'\?"),
+    "missing key": ("home = {", "gravity = [0, 0, -1]\n# {", r":1: key 'home' is missing; add it"),
+    "broken TOML": ("armature = 0.05", "armature = = 1", r":4: not valid TOML: .*; mend this line"),
+    "TOML without its end": (
+        "tip_link = [[0.0, 0.0, 0.0, 0.05]]",
+        "tip_link = [[0.0",
+        r":19: not valid TOML: .*; mend this line",
+    ),
+    # of kinds of values
+    "not a number": ("armature = 0.05", 'armature = "much"', r":4: armature: expected numbers, found 'much'; write one number"),
+    "a number in quotes": (
+        "armature = 0.05",
+        'armature = "0.05"',
+        r":4: armature: expected numbers, found '0\.05'; write one number",
+    ),
+    "not finite": ("armature = 0.05", "armature = nan", r":4: armature: every number must be finite; write a value"),
+    "negative": ("armature = 0.05", "armature = -0.05", r":4: armature: must not be below 0; mend the value"),
+    "gravity of two numbers": (
+        "[locked]",
+        "gravity = [0, -9.81]\n[locked]",
+        r":7: gravity: .* found shape \(2,\); write 3 numbers",
+    ),
+    "key of another table": ("armature = 0.3", 'armature = "x"', r":11: armature: expected numbers"),
+    "not a table": (
+        "[joint.slider]\narmature = 0.3\nu_max = 20.0",
+        "[joint]\nslider = 3",
+        r":11: slider: expected a table, found 3",
+    ),
+    "locked by a number": ("[locked]\nwelded = 0.7", "locked = 3", r":7: locked: expected a table, found 3; write \[locked\]"),
+    "not a name": ('tip = "tip_link"', "tip = 3", r":15: tip: expected a name, found 3; write it in quotes"),
+    "not true or false": ("free_base = true", "free_base = 1", r":3: free_base: expected true or false, found 1; write one of"),
+    "planar by a word": (
+        "free_base",
+        'planar_base = "yes"\nfree_base',
+        r":3: planar_base: expected true or false, found 'yes'; write",
+    ),
+    "not a posture": ("home = { oblique = 0.2, wheel = 3.0 }", "home = 0", r":5: home: expected a posture, found 0; write"),
+    # of where the robot comes from
+    "missing URDF": ('"zoo.urdf"', '"zo.urdf"', r":2: urdf: no URDF at .*zo\.urdf; correct the path"),
+    "missing SRDF": ("free_base", 'srdf = "zoo.srdf"\nfree_base', r":3: srdf: no SRDF at .*zoo\.srdf; correct the path"),
+    "path that is none": ('"zoo.urdf"', "3", r":2: urdf: expected a name, found 3; write it in quotes"),
+    "two sources": ("free_base", 'example_robot_data = "panda"\nfree_base', r":2: urdf: give exactly one of 'urdf'"),
+    "no source": ('urdf = "zoo.urdf"', "", r":1: urdf: give exactly one of 'urdf'"),
+    "unknown robot": (
+        'urdf = "zoo.urdf"',
+        'example_robot_data = "pandda"',
+        r":2: example_robot_data: .* no robot 'pandda'; did you",
+    ),
+    "SRDF given twice": (
+        'urdf = "zoo.urdf"',
+        'example_robot_data = "panda"\nsrdf = "panda.srdf"',
+        r":3: srdf: the robots of example-robot-data bring their own; delete this key",
+    ),
+    "two bases": ("free_base", "planar_base = true\nfree_base", r":3: planar_base: a base is free or planar, not both; set one"),
+    # of joints
+    "unknown joint": ("welded = 0.7", "wheld = 0.7", r":8: wheld: zoo\.urdf has no such joint; did you mean"),
+    "unknown joint of home": (
+        "oblique = 0.2",
+        "obliqe = 0.2",
+        r":5: obliqe: zoo\.urdf has no such joint; did you mean 'oblique'",
+    ),
+    "unknown joint of limits": (
+        "[joint.slider]",
+        "[joint.slyder]",
+        r":10: slyder: zoo\.urdf has no such joint; did you mean 'slider'",
+    ),
+    "unknown joint key": ("u_max = 20.0", "umax = 20.0", r":12: umax: unknown key; did you mean 'u_max'"),
+    "settings of a locked joint": ("[joint.slider]", "[joint.welded]", r":10: welded: this joint does not move; delete it here"),
+    "base in home": ("oblique = 0.2", "root_joint = 0.2", r":5: root_joint: this joint has not one coordinate; delete it here"),
+    "limits of a wheel": (
+        "[joint.slider]",
+        "[joint.wheel]\nq_lo = 0.1\n[joint.slider]",
+        r":11: q_lo: this joint turns without end; d",
+    ),
     "least force above": (
         "u_max = 20.0",
         "u_max = 20.0\nu_lo = 21.0",
-        r"robot\.toml:13: u_lo: the least force 21 of joint 'slider' is above",
+        r":13: u_lo: the least force 21 of joint 'slider' .* mend them",
     ),
-    "key of another table": ("armature = 0.3", 'armature = "x"', r"robot\.toml:11: armature: expected numbers"),
-    "two bases": ("free_base", "planar_base = true\nfree_base", r"planar_base: a base is free or planar, not both"),
-    "unknown joint key": ("u_max = 20.0", "umax = 20.0", r"robot\.toml:12: umax: unknown key; did you mean 'u_max'"),
-    "home outside": ("oblique = 0.2", "oblique = 2.0", r"nominal posture 2 is outside its limits \[-0\.8, 0\.9\]"),
-    "limits crossed": ("u_max = 20.0", "q_lo = 1.0", r"lower limit 1 is not below upper limit 0\.9"),
-    "sphere of no size": ("0.0, 0.05]]", "0.0, 0.0]]", r"radius .* must be positive"),
-    "sphere shape": ("0.0, 0.05]]", "0.05]]", r"tip_link: expected numbers of shape"),
-    "frame that rests": ('wheel_rim = "rim_link"', 'wheel_rim = "universe"', r"frame 'universe' does not move"),
-    "foot on no frame": ("[spheres]", "[feet]\ntop = 0.1\n\n[spheres]", r"top: a foot stands on a named frame; did you mean"),
-    "flat foot": ("[spheres]", "[feet]\ntip = [0.1, 0.1, 0.0]\n\n[spheres]", r"tip: a foot is a ball .* or a box"),
-    "thruster without link": ("[spheres]", THRUSTER.replace('link = "base_link"', "") + "[spheres]", r"key 'link' is missing"),
-    "thruster on a limb": ("[spheres]", THRUSTER.replace("base_link", "tip_link") + "[spheres]", r"thruster 'jet' must sit on"),
-    "thrust upside down": ("[spheres]", THRUSTER.replace("u_hi = 4.0", "u_hi = 0.1") + "[spheres]", r"0\.5 N is not below"),
-    "thruster without axis": ("[spheres]", THRUSTER.replace("[0.6, 0.0, 0.8]", "[0, 0, 0]") + "[spheres]", r"must not be zero"),
-    "posture by name": ("home = {", 'home = "stand"\n# {', r"a posture by name needs an SRDF"),
+    "home outside": (
+        "oblique = 0.2",
+        "oblique = 2.0",
+        r":5: oblique: .* posture 2 is outside its limits \[-0\.8, 0\.9\]; choose",
+    ),
+    "zero outside": ("u_max = 20.0", "q_lo = 0.1", r":5: home: joint 'slider': nominal posture 0 is outside .*; choose another"),
+    "limits crossed": (
+        "u_max = 20.0",
+        "q_lo = 1.0",
+        r":12: q_lo: .* lower limit 1 is not below upper limit 0\.\d+; mend q_lo or",
+    ),
+    "posture by name": ("home = {", 'home = "stand"\n# {', r":5: home: a posture by name needs an SRDF; give a table"),
+    "nothing moves": (
+        TEXT[TEXT.index("free_base") :],
+        "free_base = false\nhome = {}\n[frames]\n[locked]\n" + "".join(f"{name} = 0.0\n" for name in JOINTS),
+        r":6: locked: nothing moves; leave a joint free",
+    ),
+    # of frames, spheres and feet
+    "unknown frame": ('"tip_link"', '"tap_link"', r":15: tip: zoo\.urdf has no frame 'tap_link'; did you mean"),
+    "frame that rests": (
+        '"rim_link"',
+        '"universe"',
+        r":16: wheel_rim: frame 'universe' does not move; name one on a moving body",
+    ),
+    "frame that C++ cannot name": (
+        'tip = "tip_link"',
+        '"tip-2" = "tip_link"',
+        r":15: tip-2: this name cannot be one in code; write",
+    ),
+    "sphere of no size": ("0.0, 0.05]]", "0.0, 0.0]]", r":19: tip_link: a sphere's radius .* must be positive; write it in m"),
+    "sphere shape": ("0.0, 0.05]]", "0.05]]", r":19: tip_link: expected numbers of shape .*; write nx4 numbers"),
+    "rows of two lengths": ("0.0, 0.05]]", "0.0, 0.05], [1.0]]", r":19: tip_link: expected numbers, found .*; write nx4 numbers"),
+    "sphere on no link": ("tip_link = [[", "tup_link = [[", r":19: tup_link: zoo\.urdf has no frame 'tup_link'; did you mean"),
+    "foot on no frame": (
+        "[spheres]",
+        "[feet]\ntop = 0.1\n\n[spheres]",
+        r":19: top: a foot stands on a named frame; did you mean",
+    ),
+    "flat foot": (
+        "[spheres]",
+        "[feet]\ntip = [0.1, 0.1, 0.0]\n\n[spheres]",
+        r":19: tip: a foot is a ball or a box; write its radius",
+    ),
+    "foot of words": (
+        "[spheres]",
+        '[feet]\ntip = "flat"\n\n[spheres]',
+        r":19: tip: expected numbers, found \['flat'\]; write n numbers",
+    ),
+    # of thrusters
+    "thruster without link": (
+        "[spheres]",
+        thruster('link = "base_link"\n', ""),
+        r":18: \[thruster\.jet\]: key 'link' is missing; add",
+    ),
+    "thruster on a limb": (
+        "[spheres]",
+        thruster("base_link", "tip_link"),
+        r":19: link: .* must sit on the base, .*; name the base's link",
+    ),
+    "thruster on no link": (
+        "[spheres]",
+        thruster("base_link", "bse_link"),
+        r":19: link: zoo\.urdf has no frame 'bse_link'; did you",
+    ),
+    "thrust upside down": (
+        "[spheres]",
+        thruster("u_hi = 4.0", "u_hi = 0.1"),
+        r":23: u_lo: .* 0\.5 N is not below .*; exchange or mend",
+    ),
+    "thruster without axis": (
+        "[spheres]",
+        thruster("[0.6, 0.0, 0.8]", "[0, 0, 0]"),
+        r":21: axis: .* must not be zero; write the d",
+    ),
+    "thruster on a table": (
+        TEXT[TEXT.index("free_base") :],
+        "free_base = false\nhome = {}\n[frames]\n" + THRUSTER,
+        r":6: jet: a thruster needs a base that is free; write free_base = true",
+    ),
 }
 
 
 @pytest.mark.parametrize("old, new, message", WRONG.values(), ids=WRONG.keys())
 def test_wrong_robot_toml_gives_one_message(models, capfd, old, new, message):
+    """File, line, key, and after a semicolon (or as the whole) the mend."""
     spoil(models, old, new)
     assert run(models, "zoo") == 2
     error = capfd.readouterr().err
-    assert error.count("\n") == 1 and re.search(message, error), error
+    assert error.count("\n") == 1 and re.search(r"zoo/robot\.toml" + message, error), error
     assert not (models.parent / "tables").exists()
 
 
-def test_wrong_urdf_gives_one_message(models, capfd):
-    (models / "zoo" / "zoo.urdf").write_text("<robot", encoding="utf-8")
-    assert run(models, "zoo") == 2
-    assert "Pinocchio cannot read this URDF" in capfd.readouterr().err
+WRONG_URDF = {
+    "broken": ("<robot", "<robt", r":2: urdf: Pinocchio cannot read .*zoo\.urdf \(.*\); mend that file, or name another"),
+    "body without mass": (
+        'mass value="',
+        'mass value="0.0" was="',
+        r":2: urdf: .* no mass or no inertia; lock the joint or mend",
+    ),
+    "joint of two ways": (
+        '"slider" type="prismatic"',
+        '"slider" type="planar"',
+        r":2: urdf: joint 'slider' is a .* mend the URDF",
+    ),
+    "joint that floats": (
+        '"slider" type="prismatic"',
+        '"slider" type="floating"',
+        r":2: urdf: joint 'slider' floats .* mend the URDF",
+    ),
+}
 
 
-def test_body_without_mass_is_refused(models, capfd):
-    spoil(models, 'mass value="', 'mass value="0.0" was="', "zoo.urdf")
+@pytest.mark.parametrize("old, new, message", WRONG_URDF.values(), ids=WRONG_URDF.keys())
+def test_wrong_urdf_points_at_the_key_that_names_it(models, capfd, old, new, message):
+    spoil(models, "[joint.slider]\narmature = 0.3\nu_max = 20.0", "")
+    spoil(models, old, new, "zoo.urdf")
     assert run(models, "zoo") == 2
-    assert "no mass" in capfd.readouterr().err
+    error = capfd.readouterr().err.splitlines()[-1]  # the URDF parser may have its own say before
+    assert re.search(r"zoo/robot\.toml" + message, error), error
+
+
+def test_unknown_posture_of_the_srdf(models, capfd):
+    spoil(models, "home = {", 'srdf = "zoo.srdf"\nhome = "stant"\n# {')
+    state = '<robot name="zoo"><group_state name="stand" group="all"><joint name="oblique" value="0.1"/></group_state></robot>'
+    (models / "zoo" / "zoo.srdf").write_text(state, encoding="utf-8")
+    assert run(models, "zoo") == 2
+    assert re.search(r"robot\.toml:6: home: zoo\.srdf has no posture 'stant'; did you mean 'stand'\?", capfd.readouterr().err)
+
+
+def test_joints_out_of_order_are_refused():
+    """Pinocchio sorts the joints of a URDF; a tree of another origin is told."""
+    spec = read_spec("zoo", ZOO.parent)
+    tree = build(spec)
+    with pytest.raises(InputError, match=r"robot\.toml:2: urdf: joint '.*' is not in depth-first order; order the joints"):
+        check(spec, replace(tree, parent=tree.parent[::-1].copy()))
 
 
 def test_unknown_names_are_answered(models, capsys):

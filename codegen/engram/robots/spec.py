@@ -1,5 +1,6 @@
 """models/<robot>/robot.toml: which URDF, what is kept of it, and what the URDF does not say."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -63,6 +64,11 @@ class RobotSpec:
     feet: dict[str, np.ndarray]  # frame -> radius of a ball about its origin (1), or half sizes of a box that stands on it (3)
     thrusters: list[Thruster]
 
+    @property
+    def source(self) -> str:
+        """The key that names the URDF: what to point at where the URDF is wrong."""
+        return "urdf" if "urdf" in self.file.data else "example_robot_data"
+
 
 def known_robots(models: Path = MODELS) -> list[str]:
     """Names of the folders of models/ that hold a robot.toml."""
@@ -80,31 +86,38 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
     file.check_keys(data, KEYS, required=["free_base", "home", "frames"])
     if ("urdf" in data) == ("example_robot_data" in data):
         raise file.error("urdf", "give exactly one of 'urdf' (a path) and 'example_robot_data' (a name)")
-    if not isinstance(data["free_base"], bool):
-        raise file.error("free_base", "expected true or false")
-    if not isinstance(data.get("planar_base", False), bool):
-        raise file.error("planar_base", "expected true or false")
+    for key in ("free_base", "planar_base"):
+        if not isinstance(data.get(key, False), bool):
+            raise file.error(key, f"expected true or false, found {data[key]!r}; write one of the two, without quotes")
     if data["free_base"] and data.get("planar_base", False):
         raise file.error("planar_base", "a base is free or planar, not both; set one of the two to false")
-    for joint, values in data.get("joint", {}).items():
-        table = f"joint.{joint}"
+    for joint in file.table("joint"):
+        table, values = f"joint.{joint}", file.table(joint, "joint")
         file.check_keys(values, JOINT_KEYS, table=table)
         for key, value in values.items():
-            file.numbers(key, value, (), table)
+            file.numbers(key, value, (), table, 0.0 if key in ("armature", "v_max", "u_max") else -np.inf)
+    if not isinstance(data["home"], str | dict):
+        raise file.error("home", f"expected a posture, found {data['home']!r}; write the SRDF's name of one, or joint = value")
     for key in ("locked", "home"):
-        if isinstance(data.get(key), dict):
-            for joint, value in data[key].items():
+        if not isinstance(data.get(key), str) or key == "locked":
+            for joint, value in file.table(key).items():
                 file.numbers(joint, value, (), key)
-    spheres = {link: file.numbers(link, rows, (-1, 4), "spheres") for link, rows in data.get("spheres", {}).items()}
+    for frame, link in file.table("frames").items():
+        file.words(frame, link, "frames")
+        if not re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", frame):
+            raise file.error(frame, "this name cannot be one in code; write it in lower case, words joined by single _", "frames")
+    spheres = {link: file.numbers(link, rows, (-1, 4), "spheres") for link, rows in file.table("spheres").items()}
     for link, rows in spheres.items():
         if np.any(rows[:, 3] <= 0.0):
-            raise file.error(link, "a sphere's radius (fourth number) must be positive", "spheres")
-    feet = {frame: np.atleast_1d(size) for frame, size in data.get("feet", {}).items()}
-    for frame, size in feet.items():
+            raise file.error(link, "a sphere's radius (fourth number) must be positive; write it in m", "spheres")
+    feet = {}
+    for frame, size in file.table("feet").items():
         if frame not in data["frames"]:
             raise file.error(frame, f"a foot stands on a named frame; {closest(frame, list(data['frames']))}", "feet")
-        if len(file.numbers(frame, size, (-1,), "feet")) not in (1, 3) or np.any(size <= 0.0):
-            raise file.error(frame, "a foot is a ball (its radius) or a box (three half sizes), all positive, in m", "feet")
+        feet[frame] = file.numbers(frame, size if isinstance(size, list) else [size], (-1,), "feet")
+        if len(feet[frame]) not in (1, 3) or np.any(feet[frame] <= 0.0):
+            what = "a foot is a ball or a box; write its radius, or three half sizes, all positive, in m"
+            raise file.error(frame, what, "feet")
     urdf, srdf, package_dirs = _sources(file)
     return RobotSpec(
         name=name,
@@ -115,54 +128,62 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
         free_base=data["free_base"],
         planar_base=data.get("planar_base", False),
         home=data["home"],
-        armature=float(file.numbers("armature", data.get("armature", 0.0), ())),
+        armature=float(file.numbers("armature", data.get("armature", 0.0), (), least=0.0)),
         gravity=file.numbers("gravity", data.get("gravity", [0.0, 0.0, -9.81]), (3,)),
-        locked=dict(data.get("locked", {})),
-        joint=data.get("joint", {}),
+        locked=dict(file.table("locked")),
+        joint=file.table("joint"),
         frames=data["frames"],
         spheres=spheres,
         feet=feet,
-        thrusters=[_thruster(file, name, table) for name, table in data.get("thruster", {}).items()],
+        thrusters=[_thruster(file, name) for name in file.table("thruster")],
     )
 
 
-def _thruster(file: TomlFile, name: str, values: dict) -> Thruster:
+def _thruster(file: TomlFile, name: str) -> Thruster:
     """One [thruster.<name>]."""
-    table = f"thruster.{name}"
+    table, values = f"thruster.{name}", file.table(name, "thruster")
     file.check_keys(values, THRUSTER_KEYS, required=THRUSTER_KEYS, table=table)
     if not file.data["free_base"]:
-        raise file.error(name, "a thruster needs free_base = true")
+        raise file.error(name, "a thruster needs a base that is free; write free_base = true, or delete the thruster", "thruster")
     position, axis = (file.numbers(key, values[key], (3,), table) for key in ("position", "axis"))
     if np.linalg.norm(axis) < 1e-6:
-        raise file.error("axis", f"the axis of thruster '{name}' must not be zero", table)
+        raise file.error(
+            "axis", f"the axis of thruster '{name}' must not be zero; write the direction of its force, in link axes", table
+        )
     twist, u_lo, u_hi = (float(file.numbers(key, values[key], (), table)) for key in ("twist", "u_lo", "u_hi"))
     if u_lo >= u_hi:
-        raise file.error("u_lo", f"thruster '{name}': the least thrust {u_lo:g} N is not below the largest {u_hi:g} N", table)
-    return Thruster(name, values["link"], position, unit(axis), twist, u_lo, u_hi)
+        what = f"thruster '{name}': the least thrust {u_lo:g} N is not below the largest {u_hi:g} N; exchange or mend them"
+        raise file.error("u_lo", what, table)
+    return Thruster(name, file.words("link", values["link"], table), position, unit(axis), twist, u_lo, u_hi)
 
 
 def _sources(file: TomlFile) -> tuple[Path, Path | None, list[str]]:
     """URDF, SRDF and mesh search path named by a robot.toml."""
     data = file.data
+    for key in SOURCE_KEYS:
+        if key in data:
+            file.words(key, data[key])
     if "urdf" in data:
         folder = file.path.parent
         urdf = folder / data["urdf"]
         srdf = folder / data["srdf"] if "srdf" in data else None
         package_dirs = [str(folder)]
-        key = "urdf"
     else:
         from example_robot_data.robots_loader import ROBOTS, getModelPath
 
-        key, robot = "example_robot_data", data["example_robot_data"]
+        robot = data["example_robot_data"]
+        if "srdf" in data:
+            raise file.error("srdf", "the robots of example-robot-data bring their own; delete this key")
         if robot not in ROBOTS:
-            raise file.error(key, f"example-robot-data has no robot '{robot}'; {closest(robot, list(ROBOTS))}")
+            raise file.error("example_robot_data", f"example-robot-data has no robot '{robot}'; {closest(robot, list(ROBOTS))}")
         loader = ROBOTS[robot]
         folder = Path(loader.path) / loader.urdf_subpath
         share = Path(getModelPath(str(folder / loader.urdf_filename)))
         urdf = share / folder / loader.urdf_filename
         srdf = share / loader.path / loader.srdf_subpath / loader.srdf_filename if loader.srdf_filename else None
         package_dirs = [str(share), str(share.parent), str(share.parents[1])]
-    for kind, path in (("URDF", urdf), ("SRDF", srdf)):
+    for kind, path in (("urdf", urdf), ("srdf", srdf)):
         if path is not None and not path.is_file():
-            raise file.error(key, f"no {kind} at {path}; correct the path, or install the pinned packages (make setup)")
+            key = kind if kind in data else "example_robot_data"
+            raise file.error(key, f"no {kind.upper()} at {path}; correct the path, or install the pinned packages (make setup)")
     return urdf.resolve(), srdf, package_dirs

@@ -14,7 +14,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 import pinocchio as pin
 
-from engram.inputs import InputError, closest
+from engram.inputs import closest
+from engram.paths import relative
 from engram.robots.linear3 import product, turn_to
 from engram.robots.spec import PLANAR_BASE, RobotSpec, read_spec
 
@@ -123,12 +124,12 @@ def build(spec: RobotSpec) -> Tree:
     for i in np.flatnonzero((kind != FREE) & ~continuous).tolist():
         q_lo[iq[i]] = model.lowerPositionLimit[model.joints[i + 1].idx_q]
         q_hi[iq[i]] = model.upperPositionLimit[model.joints[i + 1].idx_q]
-    frames = [_frame(spec, model, R_turn, name, link) for name, link in spec.frames.items()]
+    frames = [_frame(spec, model, R_turn, name, link, "frames") for name, link in spec.frames.items()]
     p_BT, axis_B = _thrusters(spec, model)
     twist = np.array([t.twist for t in spec.thrusters])
     joint_u_max, joint_u_lo = _joint_forces(spec, model)
     one_sided = bool(spec.thrusters) or np.any(joint_u_lo != -joint_u_max)
-    spheres = [(_frame(spec, model, R_turn, link, link), row) for link, rows in spec.spheres.items() for row in rows]
+    spheres = [(_frame(spec, model, R_turn, link, link, "spheres"), row) for link, rows in spec.spheres.items() for row in rows]
     tree = Tree(
         name=spec.name,
         joint_name=list(model.names)[1:],
@@ -168,7 +169,7 @@ def build(spec: RobotSpec) -> Tree:
         model=model,
     )
     tree.q_home[:] = q_from_pin(tree, home)
-    _check(spec, tree)
+    check(spec, tree)
     return tree
 
 
@@ -198,7 +199,8 @@ def full_model(spec: RobotSpec) -> pin.Model:
     try:
         model = pin.buildModelFromUrdf(str(spec.urdf), *root)
     except (ValueError, RuntimeError) as error:
-        raise InputError(f"{spec.urdf}: Pinocchio cannot read this URDF ({error}); mend the file") from None
+        what = f"Pinocchio cannot read {relative(spec.urdf)} ({' '.join(str(error).split())}); mend that file, or name another"
+        raise spec.file.error(spec.source, what) from None
     if not spec.planar_base:
         return model
     carriage, parent = pin.Model(), 0
@@ -219,12 +221,13 @@ def _load_model(spec: RobotSpec) -> tuple[pin.Model, np.ndarray]:
             raise spec.file.error("home", "a posture by name needs an SRDF; give a table joint = value instead")
         pin.loadReferenceConfigurations(model, str(spec.srdf), False)
         if spec.home not in model.referenceConfigurations:
-            raise spec.file.error("home", f"{spec.srdf.name} has no posture of this name")
+            known = [posture.key() for posture in model.referenceConfigurations]
+            raise spec.file.error("home", f"{spec.srdf.name} has no posture '{spec.home}'; {closest(spec.home, known)}")
         home = np.array(model.referenceConfigurations[spec.home])  # a copy: the model is replaced below
     else:
-        _put(spec, model, home, spec.home)
+        _put(spec, model, home, spec.home, "home")
     weld = home.copy()
-    _put(spec, model, weld, spec.locked)
+    _put(spec, model, weld, spec.locked, "locked")
     model = pin.buildReducedModel(model, [model.getJointId(joint) for joint in spec.locked], weld)
     kept = pin.neutral(model)
     reference = full_model(spec)
@@ -235,16 +238,21 @@ def _load_model(spec: RobotSpec) -> tuple[pin.Model, np.ndarray]:
     return model, kept
 
 
-def _joint_id(spec: RobotSpec, model: pin.Model, joint: str) -> int:
+def _joint_id(spec: RobotSpec, model: pin.Model, joint: str, table: str) -> int:
+    """Of a joint that robot.toml names in `table`."""
     if not model.existJointName(joint):
-        raise spec.file.error(joint, f"{spec.urdf.name} has no such joint; {closest(joint, list(model.names)[1:])}")
+        if joint in spec.locked and table == "joint":
+            raise spec.file.error(joint, "this joint does not move; delete it here, or in [locked]", f"joint.{joint}")
+        raise spec.file.error(joint, f"{spec.urdf.name} has no such joint; {closest(joint, list(model.names)[1:])}", table)
+    if model.joints[model.getJointId(joint)].nv != 1:
+        raise spec.file.error(joint, "this joint has not one coordinate; delete it here", table)
     return model.getJointId(joint)
 
 
-def _put(spec: RobotSpec, model: pin.Model, q: np.ndarray, values: dict[str, float]) -> None:
-    """Write joint values (rad, m) into Pinocchio's q."""
+def _put(spec: RobotSpec, model: pin.Model, q: np.ndarray, values: dict[str, float], table: str) -> None:
+    """Write joint values (rad, m) of robot.toml's `table` into Pinocchio's q."""
     for name, value in values.items():
-        joint = model.joints[_joint_id(spec, model, name)]
+        joint = model.joints[_joint_id(spec, model, name, table)]
         q[joint.idx_q : joint.idx_q + joint.nq] = value if joint.nq == 1 else [np.cos(value), np.sin(value)]
 
 
@@ -254,7 +262,10 @@ def _override(spec: RobotSpec, model: pin.Model) -> None:
     base = 6 if spec.free_base else 0
     model.armature = np.concatenate([np.zeros(base), np.full(model.nv - base, spec.armature)])
     for name, values in spec.joint.items():
-        joint = model.joints[_joint_id(spec, model, name)]
+        joint = model.joints[_joint_id(spec, model, name, "joint")]
+        for key in ("q_lo", "q_hi"):
+            if key in values and joint.nq == 2:
+                raise spec.file.error(key, "this joint turns without end; delete the key", f"joint.{name}")
         for key, (array, i) in {
             "armature": (model.armature, joint.idx_v),
             "q_lo": (model.lowerPositionLimit, joint.idx_q),
@@ -270,7 +281,7 @@ def _joint_forces(spec: RobotSpec, model: pin.Model) -> tuple[np.ndarray, np.nda
     u_max = np.clip(model.effortLimit, 0.0, NO_LIMIT)
     u_lo = -u_max
     for name, values in spec.joint.items():
-        i = model.joints[_joint_id(spec, model, name)].idx_v
+        i = model.joints[_joint_id(spec, model, name, "joint")].idx_v
         u_lo[i] = values.get("u_lo", u_lo[i])
         if u_lo[i] > u_max[i]:
             what = f"the least force {u_lo[i]:g} of joint '{name}' is above the largest, {u_max[i]:g}; exchange or mend them"
@@ -287,20 +298,22 @@ def _classify(spec: RobotSpec, model: pin.Model, name: str, joint: pin.JointMode
     joint.calc(data, pin.neutral(model))
     linear, angular = np.split(np.array(data.S), 2)
     if joint.nv != 1 or (np.any(linear) and np.any(angular)):
-        kinds = "free-flyer base, revolute, continuous and prismatic"
-        raise spec.file.error(name, f"this joint is a {joint.shortname()}; known are {kinds}")
+        what = f"joint '{name}' is a {joint.shortname()}; known are revolute, continuous and prismatic, mend the URDF"
+        raise spec.file.error(spec.source, what)
     kind = REVOLUTE if np.any(angular) else PRISMATIC
     return kind, joint.nq == 2, (angular if kind == REVOLUTE else linear).ravel()
 
 
-def _frame(spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link: str) -> tuple[int, np.ndarray, np.ndarray]:
-    """Joint that carries a frame of the URDF, and R_JF, p_JF in turned joint axes."""
+def _frame(
+    spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link: str, table: str
+) -> tuple[int, np.ndarray, np.ndarray]:
+    """Joint that carries a frame of the URDF, which `key` of `table` names, and R_JF, p_JF in turned joint axes."""
     if not model.existFrame(link):
         known = [frame.name for frame in model.frames]
-        raise spec.file.error(key, f"{spec.urdf.name} has no frame '{link}'; {closest(link, known)}")
+        raise spec.file.error(key, f"{spec.urdf.name} has no frame '{link}'; {closest(link, known)}", table)
     frame = model.frames[model.getFrameId(link)]
     if frame.parentJoint == 0:
-        raise spec.file.error(key, f"frame '{link}' does not move; name one on a moving body")
+        raise spec.file.error(key, f"frame '{link}' does not move; name one on a moving body", table)
     joint = frame.parentJoint - 1
     R_JP = R_turn[joint].T
     return joint, product(R_JP, frame.placement.rotation), product(R_JP, frame.placement.translation)
@@ -309,10 +322,14 @@ def _frame(spec: RobotSpec, model: pin.Model, R_turn: np.ndarray, key: str, link
 def _thrusters(spec: RobotSpec, model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
     """Positions (n, 3) m and axes (n, 3) of the thrusters in base axes."""
     p_BT, axis_B = np.zeros((len(spec.thrusters), 3)), np.zeros((len(spec.thrusters), 3))
+    still = np.eye(3)[None].repeat(model.njoints - 1, 0)
     for n, thruster in enumerate(spec.thrusters):
-        joint, R, p = _frame(spec, model, np.eye(3)[None].repeat(model.njoints - 1, 0), thruster.name, thruster.link)
+        table = f"thruster.{thruster.name}"
+        joint, R, p = _frame(spec, model, still, "link", thruster.link, table)
         if joint != 0:
-            raise spec.file.error(thruster.name, f"thruster '{thruster.name}' must sit on the base, not on '{thruster.link}'")
+            raise spec.file.error(
+                "link", f"thruster '{thruster.name}' must sit on the base, not on '{thruster.link}'; name the base's link", table
+            )
         p_BT[n], axis_B[n] = p + product(R, thruster.position), product(R, thruster.axis)
     return p_BT, axis_B
 
@@ -327,19 +344,25 @@ def _actuation(p_BT: np.ndarray, axis_B: np.ndarray, twist: np.ndarray, nv: int)
     return B
 
 
-def _check(spec: RobotSpec, tree: Tree) -> None:
-    """Refuse trees that the controller or MuJoCo could not simulate."""
+def check(spec: RobotSpec, tree: Tree) -> None:
+    """Refuse trees that the controller or MuJoCo could not simulate. Raises InputError."""
+    if not any(tree.nsub):
+        raise spec.file.error("locked", "nothing moves; leave a joint free, or write free_base = true")
     for i, name in enumerate(tree.joint_name):
         q, lo, hi = (a[tree.iq[i]] for a in (tree.q_home, tree.q_lo, tree.q_hi))
+        stated = spec.joint.get(name, {})
+        limit, of = next(((key, f"joint.{name}") for key in ("q_lo", "q_hi") if key in stated), (spec.source, ""))
+        posture = (name, "home") if isinstance(spec.home, dict) and name in spec.home else ("home", "")
         if tree.parent[i] >= i or (tree.parent[i] >= 0 and i >= tree.parent[i] + tree.nsub[tree.parent[i]]):
-            raise spec.file.error(name, f"joint '{name}' is not in depth-first order")
+            raise spec.file.error(spec.source, f"joint '{name}' is not in depth-first order; order the joints of the URDF")
         if tree.kind[i] == FREE and i > 0:
-            raise spec.file.error(name, f"joint '{name}' floats inside the tree; only the base may be free")
+            raise spec.file.error(spec.source, f"joint '{name}' floats inside the tree; only the base may, mend the URDF")
         if tree.mass[i] <= 0.0 or np.linalg.eigvalsh(tree.inertia[i])[0] <= 0.0:
-            raise spec.file.error(
-                name, f"the body moved by joint '{name}' has no mass or no inertia; lock the joint or mend the URDF"
-            )
+            what = f"the body moved by joint '{name}' has no mass or no inertia; lock the joint or mend the URDF"
+            raise spec.file.error(spec.source, what)
         if lo >= hi:
-            raise spec.file.error(name, f"joint '{name}': lower limit {lo:g} is not below upper limit {hi:g}")
+            what = f"joint '{name}': lower limit {lo:g} is not below upper limit {hi:g}; mend q_lo or q_hi of [joint.{name}]"
+            raise spec.file.error(limit, what, of)
         if not lo <= q <= hi:
-            raise spec.file.error(name, f"joint '{name}': nominal posture {q:g} is outside its limits [{lo:g}, {hi:g}]")
+            what = f"joint '{name}': nominal posture {q:g} is outside its limits [{lo:g}, {hi:g}]; choose another, or mend them"
+            raise spec.file.error(posture[0], what, posture[1])
