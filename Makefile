@@ -29,6 +29,7 @@ test: setup
 
 bench: export TARGETS = engram_bench engram_bench_single query_bench _engine
 bench: setup
+	@scripts/setup.sh torch || echo "bench:     the rows beside PyTorch are left out"
 	@.venv/bin/python bench/run.py $(ARGS)
 
 tables: setup
@@ -36,6 +37,7 @@ tables: setup
 
 study: export TARGETS = _engine $(if $(filter 7%,$(S)),engram-pole)
 study: setup
+	@$(if $(filter 6 6.6,$(S)),scripts/setup.sh torch || echo "study:     the columns of PyTorch are left out")
 	@.venv/bin/engram study $(S) $(if $(QUICK),--quick) $(ARGS)
 
 clean:

@@ -86,9 +86,3 @@ def error(rival: Rival, x: np.ndarray) -> float:
     """Largest difference to the peer."""
     found = engine.Table(rival.table).answers(x, rival.answers)
     return float(np.abs(rival.agree(found) - rival.peer(x)).max())
-
-
-def facts(size: int, operations: int) -> str:
-    """Bytes of a table, multiply-adds of a query, and the time to read as many bytes from where they lie, cache or memory."""
-    limit = float(np.median(engine.read_us(size, 50)))
-    return f"    {size} bytes, {operations} multiply-adds; reading as many bytes takes {limit:.2f} us"

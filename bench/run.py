@@ -32,6 +32,7 @@ COST_TOLERANCE = 1e-8
 ROUNDING = 2.0**-24
 RECURSION_SINGLE = 30 * ROUNDING
 COST_SINGLE = 100 * ROUNDING
+NO_ALLOCATION = "  allocations: 0, no allocator is linked into the evaluators (tests/unit/test_symbols.py)"
 # The stopping criterion may cross its threshold one iteration apart.
 ITERATION_TOLERANCE = 1
 
@@ -306,7 +307,6 @@ class Bench:
 
     def queries(self) -> None:
         """The memory: its tables beside scikit-learn, and one whole query."""
-        import learners
         import queries
         from threadpoolctl import threadpool_limits
 
@@ -332,7 +332,7 @@ class Bench:
         for name, samples in mine.items():
             self.figures.add("query", name, samples, theirs.get(name), holds, None)
             if name in peer.work:
-                print(learners.facts(*peer.work[name]))
+                self.facts(f"query.{name}", *peer.work[name], samples)
 
     def learners(self) -> None:
         """Kinds of tables that the Panda's memory does not ask for, or not alone."""
@@ -356,9 +356,103 @@ class Bench:
                     if rival.peer:
                         peer.append(one_by_one(rival.peer, x))
                 theirs = Samples(np.concatenate(peer)) if peer else None
-                self.figures.add("query", rival.name, Samples(np.concatenate(mine)), theirs, holds, None)
-                print(learners.facts(table_bytes(rival.table), rival.operations))
-        print("  allocations: 0, no allocator is linked into the evaluators (tests/unit/test_symbols.py)")
+                ours = Samples(np.concatenate(mine))
+                self.figures.add("query", rival.name, ours, theirs, holds, None)
+                self.facts(f"query.{rival.name}", table_bytes(rival.table), rival.operations, ours)
+        print(NO_ALLOCATION)
+
+    def facts(self, name: str, size: int, operations: int, ours: Samples) -> None:
+        """Bytes that a query reads, its multiply-adds; how much of our time it takes to read as many bytes where they lie."""
+        from engram.engine import engine
+
+        limit = float(np.median(engine.read_us(size, 50)))
+        share = f"reading as many bytes takes {limit:.2f} us, {limit / ours.median:.0%} of our time"
+        print(f"    {size} bytes, {operations} multiply-adds, {2e-3 * operations / ours.median:.1f} GFLOP/s; {share}")
+        self.figures.rows.append(
+            {"id": f"bench.{name}.of_bandwidth", "value": limit / ours.median, "unit": "1", "n": len(ours.us), "gate": True}
+        )
+
+    def trains(self) -> None:
+        """Tensor trains beside PyTorch and teneva, networks beside PyTorch."""
+        from threadpoolctl import threadpool_limits
+
+        from engram import pytorch
+
+        with threadpool_limits(1), pytorch.optional() as worker:
+            if worker:
+                self.sampling(worker)
+                self.networks(worker)
+            else:
+                print(f"\nbench: {pytorch.MISSING}; its rows are left out: sampling of trains, ensembles, density networks")
+            self.crosses()
+
+    def sampling(self, worker) -> None:
+        """Samples of random positive trains (figure 7.18); the gate: the probability of what we draw."""
+        import trains
+
+        from engram.study.sampling import Sides
+
+        self.figures.title(
+            "tt: samples of a train, alpha 0.9, beside PyTorch (algorithm 6 as printed; tuned) and teneva (alpha 0)"
+        )
+        for case, counts in trains.CASES:
+            sides = Sides(case, worker)
+            holds = gate(f"train d={case.d} n={case.n} r={case.r}", {"log probability": sides.error()}, case.tolerance)
+            self.all_hold &= holds
+            for count in counts:
+                us = {name: Samples(values) for name, values in sides.times_us(count, min(self.rounds, 3)).items()}
+                for name, key in (("pytorch", "sample"), ("tuned", "sample_tuned"), ("teneva", "sample_teneva")):
+                    if name in us:
+                        self.figures.add("tt", f"{key}.{case.name(count)}", us["ours"], us[name], holds, None)
+                self.facts(f"tt.sample.{case.name(count)}", case.bytes_read(count), case.operations(count), us["ours"])
+        print(NO_ALLOCATION)
+
+    def networks(self, worker) -> None:
+        """Ensembles and mixture density networks."""
+        import learners
+        import trains
+
+        from engram.engine import engine
+        from engram.learn.contenders import table_bytes
+
+        x, y, domain = learners.data()
+        self.figures.title("query: networks at the Panda's sizes beside PyTorch, one query at a time")
+        for name, network in trains.networks(x, y).items():
+            table = trains.table(network, domain)
+            ours, queries = engine.Table(table), x[: learners.QUERIES]
+            holds = gate(f"query {name}", trains.error(network, ours, worker, x.min(0), x.max(0)), trains.TOLERANCE)
+            self.all_hold &= holds
+            mine, peer = [], []
+            for _ in range(self.rounds):
+                mine.append(ours.time_us(queries, trains.answers(network)))
+                peer.append(worker.ask("predict_one_by_one", x=queries)["us"])
+            samples = Samples(np.concatenate(mine))
+            self.figures.add("query", name, samples, Samples(np.concatenate(peer)), holds, None)
+            self.facts(f"query.{name}", table_bytes(table), trains.operations(network), samples)
+
+    def crosses(self) -> None:
+        """Cross approximation of table 7.1's density; the gate: samples of our train succeed as often as teneva's, as far as so
+        many tasks can tell: two standard errors of the difference of two shares."""
+        import trains
+
+        from engram.study.sampling import BEST_OF, crosses
+
+        print(f"\ntt: cross approximation of table 7.1's density, the best of {BEST_OF} seeds on validation tasks,")
+        print(f"    beside one of teneva's, same starts, same rank, {len(trains.SEEDS)} times by turns")
+        found = list(crosses(trains.SEEDS, trains.TESTS))
+        sides = {who: [cross for cross in found if cross.who == who] for who in ("ours", "teneva")}
+        seconds = {who: Samples(np.array([1e6 * cross.seconds for cross in side])) for who, side in sides.items()}
+        success = {who: float(np.mean([cross.success for cross in side])) for who, side in sides.items()}
+        chance = 2 * np.sqrt(sum(share * (1 - share) for share in success.values()) / (len(trains.SEEDS) * trains.TESTS))
+        holds = gate("cross, success of one sample", {"below teneva's": max(0.0, success["teneva"] - success["ours"])}, chance)
+        self.all_hold &= holds
+        self.figures.title(f"tt: rank {found[0].rank}")
+        self.figures.add("tt", "cross", seconds["ours"], seconds["teneva"], holds, None)
+        for who, side in sides.items():
+            share = f"success of one sample {success[who]:.1%} of {trains.TESTS} tasks"
+            print(f"    {who:<7} {share}; {side[0].values} values of the density")
+        row = {"id": "bench.tt.cross_success", "value": success["ours"], "unit": "1", "n": trains.TESTS, "gate": holds}
+        self.figures.rows.append({**row, "peer": success["teneva"]})
 
     def gemm(self) -> None:
         """The limit of arithmetic: the best rate of a matrix product, under our flags and under the machine's own."""
@@ -375,7 +469,7 @@ class Bench:
 
 
 def main() -> int:
-    parts = [*PROBLEMS, *ROBOTS, "memory"]
+    parts = [*PROBLEMS, *ROBOTS, "memory", "trains"]
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--build", type=Path, default=ROOT / "build", help="build folder (default: build)")
     parser.add_argument("--rounds", type=int, default=7, help="how often the two sides alternate (default: 7)")
@@ -392,6 +486,8 @@ def main() -> int:
     if "memory" in only:
         bench.queries()
         bench.learners()
+    if "trains" in only:
+        bench.trains()
     out = args.build / "figures" / "bench.json"
     bench.figures.write(out)
     print(f"\nwrote {out}")

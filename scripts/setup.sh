@@ -1,7 +1,8 @@
 #!/usr/bin/env bash
 # Makes this checkout ready to run: Debian packages, Python environment, build. Safe to run again: what is done is skipped.
 #
-#   scripts/setup.sh [packages] [python] [build] [scene] [network]     no argument: all, in this order
+#   scripts/setup.sh [packages] [python] [build] [scene] [network]     no argument: all of these, in this order
+#   scripts/setup.sh torch                                             the optional extra: PyTorch, reference of `make bench`
 #
 # PYTHON=/path/to/python3.11 chooses the interpreter. JOBS=n sets the number of parallel compilations. TARGETS="a b" builds these only.
 set -euo pipefail
@@ -41,23 +42,36 @@ find_python() {
 
 setup_packages() {
   command -v dpkg-query > /dev/null || fail "this is not Debian or Ubuntu" "install by hand: ${packages[*]}"
-  local python missing=() package
   # Without any Python 3.11 yet, Debian's own is one of the packages.
+  local python
   python=$(find_python 2> /dev/null) || { packages+=(python3); python=/usr/bin/python3; }
   if [[ $python == /usr/bin/* ]]; then packages+=(python3-venv python3-dev); fi
-  for package in "${packages[@]}"; do installed "$package" || missing+=("$package"); done
+  apt_install packages "${packages[@]}"
+}
+
+# PyPI's wheel takes gigabytes, Debian's package 0.5; it belongs to /usr/bin/python3, which engram.pytorch runs.
+setup_torch() {
+  command -v dpkg-query > /dev/null || fail "this is not Debian or Ubuntu" "none: what needs PyTorch is left out"
+  apt_install torch python3-torch
+}
+
+# apt_install <step> <package>...: installs what is missing.
+apt_install() {
+  local step=$1 missing=() package
+  shift
+  for package in "$@"; do installed "$package" || missing+=("$package"); done
   if [ ${#missing[@]} = 0 ]; then
-    say packages "all ${#packages[@]} are installed"
+    say "$step" "$([ $# = 1 ] && echo "$1 is" || echo "all $# are") installed"
     return
   fi
-  say packages "installing ${missing[*]}"
+  say "$step" "installing ${missing[*]}"
   local log=build/logs/apt.log
   mkdir -p build/logs
   if [ "$(id -u)" != 0 ] && ! command -v sudo > /dev/null; then
     fail "Debian packages are missing and this user is neither root nor has sudo" "as root: apt-get install ${missing[*]}"
   fi
   if ! apt-cache show "${missing[@]}" > /dev/null 2>&1; then
-    say packages "fetching the package lists"
+    say "$step" "fetching the package lists"
     as_root apt-get update > "$log" 2>&1 || fail "apt-get update failed, see $log" "check the network, then run again"
   fi
   as_root env DEBIAN_FRONTEND=noninteractive apt-get install -y --no-install-recommends "${missing[@]}" >> "$log" 2>&1 < /dev/null ||
@@ -133,7 +147,7 @@ setup_network() {
 [ $# -gt 0 ] || set -- packages python build scene network
 for step in "$@"; do
   case $step in
-    packages | python | build | scene | network) "setup_$step" ;;
-    *) fail "unknown step $step" "steps: packages python build scene network" ;;
+    packages | python | build | scene | network | torch) "setup_$step" ;;
+    *) fail "unknown step $step" "steps: packages python build scene network torch" ;;
   esac
 done

@@ -2,25 +2,18 @@
 #include "codegen/binding/arrays.h"
 #include "codegen/binding/engine_problems.h"
 #include "codegen/binding/held_table.h"
+#include "codegen/binding/thread_clock.h"
 #include "controller/tab/tab_eval.h"
 #include "controller/tab/tab_gmr.h"
 #include "controller/tab/tab_mlp.h"
 #include "controller/tab/tab_sdf.h"
 
-#include <ctime>
 #include <functional>
 
 namespace engram::binding {
 namespace {
 
 using Floats = std::vector<float>;
-
-// Processor time of this thread [us]
-double thread_us() {
-  timespec t;
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-  return 1e6 * double(t.tv_sec) + 1e-3 * double(t.tv_nsec);
-}
 
 // Time [us] of reading `bytes` once, n samples over the same memory: what no query of a table of that size can beat.
 NewArray read_us(std::size_t bytes, std::size_t n) {

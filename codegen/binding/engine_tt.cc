@@ -2,9 +2,11 @@
 #include "codegen/binding/arrays.h"
 #include "codegen/binding/engine_problems.h"
 #include "codegen/binding/held_table.h"
+#include "codegen/binding/thread_clock.h"
 #include "controller/tab/tab_tt.h"
 
 #include <cstdlib>
+#include <vector>
 
 namespace engram::binding {
 namespace {
@@ -43,6 +45,19 @@ class TensorTrain {
     return nb::make_tuple(x.release(), log_prob.release());
   }
 
+  // Processor time of each of `repeats` calls [us]: `count` samples, a seed of its own each
+  NewArray time_us(double alpha, int count, std::size_t repeats) {
+    if (count < 1 || count > sampler_.capacity) throw nb::value_error("count: 1 .. capacity");
+    std::vector<double> x(std::size_t(count) * tab_->d);
+    NewArray us({repeats});
+    for (std::size_t i = 0; i < repeats; ++i) {
+      const double start = thread_us();
+      (void)tab_tt_sample(&sampler_, alpha, count, i, x.data(), nullptr);
+      us.data()[i] = thread_us() - start;
+    }
+    return us;
+  }
+
   int64_t bytes() const {
     int64_t words = 0;
     for (int i = 0; i < tab_->head.narray; ++i) words += tab_->head.array[i].count;
@@ -69,6 +84,8 @@ void bind_tensor_train(nb::module_& engine) {
       .def("value", &TensorTrain::value, "x"_a, "(density (m), gradient (m, d), status (m)) at x (m, d).")
       .def("condition", &TensorTrain::condition, "x"_a, "fixed"_a, "Conditions on the variables that are fixed; the status.")
       .def("sample", &TensorTrain::sample, "alpha"_a, "count"_a, "seed"_a = 1, "(x (count, d), log probability (count)).")
+      .def("time_us", [](TensorTrain& t, double alpha, int count, std::size_t repeats) { return t.time_us(alpha, count, repeats).release(); },
+           "alpha"_a, "count"_a, "repeats"_a, "Processor time of calls that draw `count` samples [us].")
       .def_prop_ro("bytes", &TensorTrain::bytes, "Bytes of the table's arrays.")
       .def_prop_ro("sampler_bytes", &TensorTrain::sampler_bytes, "Bytes of the sampler's memory.");
 }

@@ -37,10 +37,15 @@ inline TabLanes tab_load_half(const uint16_t* p) {
   return v;
 }
 inline TabLanes tab_load_byte(const int8_t* p) {
-  typedef int8_t Bytes __attribute__((vector_size(TAB_LANES)));
-  Bytes byte;
-  std::memcpy(&byte, p, sizeof byte);
-  return __builtin_convertvector(byte, TabLanes);
+  // Every byte is shuffled to the top of a word of its own, then shifted down with its sign: gcc 12 converts them one by one otherwise.
+  typedef int8_t Bytes __attribute__((vector_size(sizeof(TabLanes))));
+  typedef int32_t Words __attribute__((vector_size(sizeof(TabLanes))));
+  typedef int64_t Quads __attribute__((vector_size(sizeof(TabLanes))));
+  int64_t eight;
+  std::memcpy(&eight, p, sizeof eight);
+  const Bytes top = {0, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 3, 16, 16, 16, 20, 16, 16, 16, 21, 16, 16, 16, 22, 16, 16, 16, 23};
+  const Bytes spread = __builtin_shuffle(reinterpret_cast<Bytes>(Quads{} + eight), top);
+  return __builtin_convertvector(reinterpret_cast<Words>(spread) >> 24, TabLanes);
 }
 
 // Eight numbers of an array of a type, from number i on.

@@ -50,6 +50,7 @@ typedef struct TabTtSampler {
   int32_t *begin, *begin_next;    /* (capacity + 1) first of each such group in order */
   int32_t* point;                 /* (capacity) what the sample order[i] chose */
   int32_t *parent, *choice;       /* (capacity) of a new group: the group it came from, the point it chose */
+  int32_t* alike;                 /* (capacity) new groups, those of the same choice side by side */
 } TabTtSampler;
 
 /* Bytes that tab_tt_init needs, aligned to 64. */

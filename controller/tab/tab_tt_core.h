@@ -43,31 +43,43 @@ inline TtPoint tt_point(const TabTt* tab, int32_t k, double x) {
   return {i, static_cast<float>(at - i), step, x >= lo && x <= hi};
 }
 
-// out_g[c ..] = sum_j row_g[j] M[j][c ..] for G rows and V vectors of columns; M (rows, width) begins at number `at`.
+// out_g[c ..] = sum_j row_g[j] M[j][c ..] for G rows, side by side (rows, G), and V vectors of columns; M (rows, width) begins at
+// number `at`.
 template <int type, int G, int V>
-inline void tt_product(const float* const* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out) {
+inline void tt_product(const float* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out) {
   TabLanes sum[G][V] = {};
   for (int32_t j = 0; j < rows; ++j) {
-    for (int v = 0; v < V; ++v) {
-      const TabLanes m = tab_load_as<type>(data, at + static_cast<int64_t>(j) * width + c + v * TAB_LANES);
-      for (int g = 0; g < G; ++g) sum[g][v] += m * row[g][j];
-    }
+    TabLanes m[V];
+    for (int v = 0; v < V; ++v) m[v] = tab_load_as<type>(data, at + static_cast<int64_t>(j) * width + c + v * TAB_LANES);
+    for (int g = 0; g < G; ++g)
+      for (int v = 0; v < V; ++v) sum[g][v] += m[v] * row[j * G + g];
   }
   for (int g = 0; g < G; ++g)
     for (int v = 0; v < V; ++v) tab_store(out[g] + c + v * TAB_LANES, sum[g][v]);
 }
 
-// out_g = row_g M for G rows, as many columns at a time as registers hold.
+// The same for a number of vectors that is known when it runs: 1 .. V.
+template <int type, int G, int V>
+inline void tt_pass(int32_t vectors, const float* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out) {
+  if (vectors == V) return tt_product<type, G, V>(row, rows, data, at, width, c, out);
+  if constexpr (V > 1) tt_pass<type, G, V - 1>(vectors, row, rows, data, at, width, c, out);
+}
+
+// out_g = row_g M for G rows, in as few passes over the rows of M as registers allow, all of about the same number of vectors.
 template <int type, int G>
 inline void tt_rows_times(const float* const* row, int32_t rows, const void* data, int64_t at, int32_t width, float* const* out) {
-  constexpr int kWide = G == 1 ? 8 : 2;
-  int32_t c = 0;
-  for (; c + kWide * TAB_LANES <= width; c += kWide * TAB_LANES) tt_product<type, G, kWide>(row, rows, data, at, width, c, out);
-  if constexpr (G == 1) {
-    for (; c + 4 * TAB_LANES <= width; c += 4 * TAB_LANES) tt_product<type, G, 4>(row, rows, data, at, width, c, out);
-    for (; c + 2 * TAB_LANES <= width; c += 2 * TAB_LANES) tt_product<type, G, 2>(row, rows, data, at, width, c, out);
+  constexpr int kMost = G == 1 ? 8 : 3;
+  alignas(64) float packed[G > 1 ? TAB_TT_MAX_R * G : 1];
+  for (int32_t j = 0; G > 1 && j < rows; ++j)
+    for (int g = 0; g < G; ++g) packed[j * G + g] = row[g][j];
+  const float* const side_by_side = G > 1 ? packed : row[0];
+  int32_t left = width / TAB_LANES;
+  for (int32_t passes = (left + kMost - 1) / kMost, c = 0; passes > 0; --passes) {
+    const int32_t vectors = (left + passes - 1) / passes;
+    tt_pass<type, G, kMost>(vectors, side_by_side, rows, data, at, width, c, out);
+    left -= vectors;
+    c += vectors * TAB_LANES;
   }
-  for (; c + TAB_LANES <= width; c += TAB_LANES) tt_product<type, G, 1>(row, rows, data, at, width, c, out);
 }
 
 template <int type> inline float tt_number(const void* data, int64_t at) {
@@ -75,17 +87,22 @@ template <int type> inline float tt_number(const void* data, int64_t at) {
   else return static_cast<const float*>(data)[at];
 }
 
-// out (width) = row (rows) times slice i
-inline void tt_row_times_slice(const TtCore& core, int32_t i, const float* row, float* out) {
+// out_g (width) = row_g (rows) times slice i for G rows
+template <int G> inline void tt_rows_times_slice(const TtCore& core, int32_t i, const float* const* row, float* const* out) {
   const auto times = [&](auto type) {
     const int64_t at = core.slice(i);
-    if (core.width > 1) return tt_rows_times<type, 1>(&row, core.rows, core.data, at, core.width, &out);
-    float sum = 0;
-    for (int32_t j = 0; j < core.rows; ++j) sum += row[j] * tt_number<type>(core.data, at + j);
-    out[0] = sum;
+    if (core.width > 1) return tt_rows_times<type, G>(row, core.rows, core.data, at, core.width, out);
+    for (int g = 0; g < G; ++g) {
+      float sum = 0;
+      for (int32_t j = 0; j < core.rows; ++j) sum += row[g][j] * tt_number<type>(core.data, at + j);
+      out[g][0] = sum;
+    }
   };
   if (core.type == kTabInt8) times(std::integral_constant<int, kTabInt8>());
   else times(std::integral_constant<int, kTabFloat32>());
+}
+inline void tt_row_times_slice(const TtCore& core, int32_t i, const float* row, float* out) {
+  tt_rows_times_slice<1>(core, i, &row, &out);
 }
 
 // out (rows), `stride` apart, = slice i times column (width)

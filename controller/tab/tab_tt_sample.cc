@@ -6,7 +6,8 @@ using namespace engram;
 
 namespace {
 
-// x^power for x in (0, 1]; 0 for x = 0. By log2 and exp2 of the eight lanes: relative error below (3 + power) 1e-6.
+// x^power for x in [0, 1], power >= 1; 0 where that is below 2^-126. By log2 and exp2 of the eight lanes: relative error below
+// (3 + power) 1e-6.
 TabLanes power_of(const TabLanes& x, float power) {
   typedef int32_t Words __attribute__((vector_size(sizeof(TabLanes))));
   Words bits;
@@ -30,7 +31,7 @@ TabLanes power_of(const TabLanes& x, float power) {
   TabLanes scale;
   std::memcpy(&scale, &scale_bits, sizeof scale);
   const TabLanes zero{};
-  return (y > low) & (x > zero) ? two_f * scale : zero;
+  return y > low ? two_f * scale : zero;
 }
 
 // pi_k (rows) and W_k (rows, pad(n)) of one core from pi_k+1
@@ -140,12 +141,13 @@ int64_t lay_out(TabTtSampler* s, const TabTt* tab, int32_t capacity, void* memor
   m.take(s->point, capacity);
   m.take(s->parent, capacity);
   m.take(s->choice, capacity);
+  m.take(s->alike, capacity);
   m.take(s->begin, capacity + 1);
   m.take(s->begin_next, capacity + 1);
   return m.used;
 }
 
-constexpr int32_t kBlock = 4;  // groups that share one pass over W
+constexpr int32_t kBlock = 4;  // groups that share one pass over W, or over a slice
 
 // p = row W for the groups first .. first + members
 void weigh(const TabTtSampler& s, const TtCore& core, const float* W, int32_t first, int32_t members, Choice (&block)[kBlock]) {
@@ -174,7 +176,8 @@ int32_t split(TabTtSampler& s, const Choice& choice, int32_t g, int32_t k, uint6
     s.order_next[begin] = s.order[begin];
     return nchild + 1;
   }
-  int32_t next[TAB_TT_MAX_N] = {};
+  int32_t next[TAB_TT_MAX_N];
+  std::memset(next, 0, sizeof(int32_t) * choice.n);
   for (int32_t i = begin; i < end; ++i) next[s.point[i]]++;
   for (int32_t point = 0, at = begin; point < choice.n; ++point) {
     if (!next[point]) continue;
@@ -186,6 +189,39 @@ int32_t split(TabTtSampler& s, const Choice& choice, int32_t g, int32_t k, uint6
   }
   for (int32_t i = begin; i < end; ++i) s.order_next[next[s.point[i]]++] = s.order[i];
   return nchild;
+}
+
+// row_next = row P^k[choice] for all new groups, those of the same choice together: each slice is read once.
+void descend(TabTtSampler& s, const TtCore& core, int32_t nchild) {
+  if (nchild == 1) {
+    tt_row_times_slice(core, s.choice[0], s.row, s.row_next);
+    tt_rescale(s.row_next, core.columns);
+    return;
+  }
+  int32_t next[TAB_TT_MAX_N];
+  std::memset(next, 0, sizeof(int32_t) * core.n);
+  for (int32_t c = 0; c < nchild; ++c) next[s.choice[c]]++;
+  for (int32_t point = 0, at = 0; point < core.n; ++point) {
+    const int32_t alike = next[point];
+    next[point] = at;
+    at += alike;
+  }
+  for (int32_t c = 0; c < nchild; ++c) s.alike[next[s.choice[c]]++] = c;  // next: now where the following point begins
+  for (int32_t first = 0; first < nchild;) {
+    const int32_t point = s.choice[s.alike[first]];
+    const float* row[kBlock];
+    float* out[kBlock];
+    const int32_t members = next[point] - first < kBlock ? next[point] - first : kBlock;
+    for (int32_t b = 0; b < kBlock; ++b) {
+      const int32_t c = s.alike[first + (b < members ? b : 0)];
+      row[b] = s.row + static_cast<int64_t>(s.parent[c]) * TAB_TT_MAX_R;
+      out[b] = s.row_next + static_cast<int64_t>(c) * TAB_TT_MAX_R;
+    }
+    if (members == 1) tt_rows_times_slice<1>(core, point, row, out);
+    else tt_rows_times_slice<kBlock>(core, point, row, out);
+    for (int32_t b = 0; b < members; ++b) tt_rescale(out[b], core.columns);
+    first += members;
+  }
 }
 
 template <class T> void swap(T& a, T& b) {
@@ -310,8 +346,8 @@ TabStatus tab_tt_sample(TabTtSampler* s, double alpha, int32_t count, uint64_t s
     for (int32_t first = 0; first < ngroup; first += kBlock) {
       const int32_t members = ngroup - first < kBlock ? ngroup - first : kBlock;
       weigh(*s, core, W, first, members, block);
+      for (int32_t b = 0; b < members; ++b) block[b].prepare(beta, greedy);
       for (int32_t b = 0; b < members; ++b) {
-        block[b].prepare(beta, greedy);
         nchild = split(*s, block[b], first + b, k, seed, nchild);
         for (int32_t i = s->begin[first + b]; i < s->begin[first + b + 1]; ++i) {
           const int32_t sample = s->order[i], point = s->point[i];
@@ -321,11 +357,7 @@ TabStatus tab_tt_sample(TabTtSampler* s, double alpha, int32_t count, uint64_t s
       }
     }
     s->begin_next[nchild] = count;
-    for (int32_t c = 0; c < nchild && k < last_free; ++c) {
-      float* out = s->row_next + static_cast<int64_t>(c) * TAB_TT_MAX_R;
-      tt_row_times_slice(core, s->choice[c], s->row + static_cast<int64_t>(s->parent[c]) * TAB_TT_MAX_R, out);
-      tt_rescale(out, core.columns);
-    }
+    if (k < last_free) descend(*s, core, nchild);
     swap(s->row, s->row_next);
     swap(s->order, s->order_next);
     swap(s->begin, s->begin_next);
