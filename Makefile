@@ -1,5 +1,5 @@
 # The front doors of Engram. Every target sets up what it needs and skips what is done.
-# ROBOT=panda|talos|anymal|hector and TASK=... choose what is shown, SEED=n another series of tasks, JOBS=n the number of parallel compilations, PYTHON=... the interpreter; ARGS="..." goes
+# ROBOT=panda|talos|anymal|hector|pendulum|unicycle|bicopter and TASK=... choose what is shown, SEED=n another series of tasks, JOBS=n the number of parallel compilations, PYTHON=... the interpreter; ARGS="..." goes
 # to the command behind the target.
 SHELL := /bin/bash
 SEED ?= 1
@@ -10,6 +10,7 @@ export JOBS PYTHON
 help:
 	@echo "make demo    run the arm that remembers: video, report and summary in runs/<time>/   (SEED=n)"
 	@echo "make demo ROBOT=talos|anymal|hector   the same of a humanoid, a quadruped, a quadrotor (TASK=...)"
+	@echo "make demo ROBOT=pendulum|unicycle|bicopter   and of systems that are a formula"
 	@echo "make test    build everything and run every test"
 	@echo "make bench   time the controller beside its peers"
 	@echo "make study   make a row of the thesis again beside ours: S=6.3, or S=6 for a chapter   (QUICK=1)"

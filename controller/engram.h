@@ -40,6 +40,9 @@ extern const engram_model engram_talos_walk;
 extern const engram_model engram_talos_pole;
 extern const engram_model engram_anymal_trot;
 extern const engram_model engram_hector_fly;
+extern const engram_model engram_pendulum_swing;
+extern const engram_model engram_unicycle_park;
+extern const engram_model engram_bicopter_fly;
 
 // ---- what a model is ----
 

@@ -13,6 +13,7 @@
 
 #include "sim_harness/sim_faults.h"
 #include "sim_harness/sim_flight.h"
+#include "sim_harness/sim_formula.h"
 #include "sim_harness/sim_judge.h"
 #include "sim_harness/sim_link.h"
 #include "sim_harness/sim_log.h"
@@ -57,7 +58,7 @@ PlantOptions read_options(int argc, char** argv) {
   parse_options(
       argc, argv, kAbout,
       {{"--scene", "FILE", "MJCF of robot and world", &o.scene},
-       {"--engine", "mujoco|cvode", "cvode: integrate one free body on thrusters to 1e-12; default mujoco", &o.engine},
+       {"--engine", "mujoco|cvode", "cvode: integrate a free body on thrusters, or a formula, to 1e-12; default mujoco", &o.engine},
        {"--series", "FILE", "targets to reach (sim_harness/sim_series.h)", &o.series},
        {"--scenario", "FILE", "episodes to get through (sim_harness/sim_scenario.h); without either, just simulate", &o.scenario},
        {"--duration", "S", "end after this much simulated time; default: when series or scenario end", &o.duration},
@@ -117,7 +118,8 @@ class Plant {
   Judge judge_;
   Referee referee_;
   Script* script_ = nullptr;  // judge_ or referee_
-  Flight flight_;
+  Flight flight_;    // one of them, if the engine is cvode
+  Formula formula_;
   Faults faults_;
   EventLog log_;
   Link link_;
@@ -138,7 +140,9 @@ std::string Plant::init() {
   if (o_.log_every < 1 || o_.faults.latency < 0) return "--log-every must be at least 1 and --latency at least 0";
   std::string wrong = model_.load(o_.scene.c_str());
   if (!wrong.empty()) return wrong;
-  if (o_.engine == "cvode") wrong = flight_.init(model_);
+  const bool formula = !model_.formula.empty(), cvode = o_.engine == "cvode";
+  if (formula && !cvode) return "this scene is moved by the formula '" + model_.formula + "', not by MuJoCo; add --engine cvode";
+  if (cvode) wrong = formula ? formula_.init(model_) : flight_.init(model_);
   if (wrong.empty()) wrong = read_script();
   if (!wrong.empty()) return wrong;
   step_us_ = static_cast<int64_t>(model_.m->opt.timestep * 1e6 + 0.5);
@@ -260,7 +264,7 @@ ExitCode Plant::answer_step() {
   if (script_) script_->command(model_.torque_share(), link_.command().status);
   faults_.push(&model_, t_);
   if (o_.engine == "cvode") {
-    const std::string wrong = flight_.step(&model_);
+    const std::string wrong = formula_.ready() ? formula_.step(&model_) : flight_.step(&model_);
     if (!wrong.empty()) {
       std::fprintf(stderr, "engram-plant: %s at t = %.3f s; the last commands in the log tell why\n", wrong.c_str(), t_);
       return kDiverged;

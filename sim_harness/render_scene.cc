@@ -117,11 +117,15 @@ void Scene::draw(const Panel& panel) {
   if (panel.q) pose(*panel.q);
   const int target = mj_name2id(model_.m, mjOBJ_BODY, "target");
   const int mocap = target >= 0 ? model_.m->body_mocapid[target] : -1;
-  if (mocap >= 0 && panel.target && panel.target->size() >= 4) {  // p_WT and quaternion x y z w, or yaw
+  if (mocap >= 0 && panel.target) {  // p_WT and quaternion x y z w, or yaw; in a plane what the numbers `target_of` say
     const std::vector<double>& t = *panel.target;
-    double quat[4] = {std::cos(0.5 * t[3]), 0, 0, std::sin(0.5 * t[3])};
+    const int numeric = mj_name2id(model_.m, mjOBJ_NUMERIC, "target_of");
+    const double in_order[4] = {0, 1, 2, 3}, *of = numeric < 0 ? in_order : model_.m->numeric_data + model_.m->numeric_adr[numeric];
+    double p[4];
+    for (int i = 0; i < 4; ++i) p[i] = of[i] >= 0 && of[i] < static_cast<double>(t.size()) ? t[static_cast<size_t>(of[i])] : 0.0;
+    double quat[4] = {std::cos(0.5 * p[3]), 0, 0, std::sin(0.5 * p[3])};
     if (t.size() >= 7) quat[0] = t[6], quat[1] = t[3], quat[2] = t[4], quat[3] = t[5];
-    mju_copy3(model_.d->mocap_pos + 3 * mocap, t.data());
+    mju_copy3(model_.d->mocap_pos + 3 * mocap, p);
     mju_copy4(model_.d->mocap_quat + 4 * mocap, quat);
     mj_kinematics(model_.m, model_.d);
   }

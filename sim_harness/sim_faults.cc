@@ -7,6 +7,8 @@
 
 namespace engram::sim {
 
+constexpr double kSlide = 1e-5;  // kg
+
 std::string Faults::init(const FaultOptions& options, const Model& model) {
   options_ = options;
   random_.seed(options.seed);
@@ -70,9 +72,9 @@ void Faults::strike(RandomPushes* random, const Model& model, double t) {
   std::uniform_real_distribution<double> uniform(0.0, 1.0);
   Push push;
   push.t = t;
-  do {  // a body that moves
+  do {  // a body that moves, and is more than a slide
     push.body = 1 + static_cast<int>(uniform(random_) * (model.m->nbody - 1));
-  } while (model.m->body_weldid[push.body] == 0);
+  } while (model.m->body_weldid[push.body] == 0 || model.m->body_mass[push.body] <= kSlide);
   const double height = 2.0 * uniform(random_) - 1.0, turn = 6.283185307179586 * uniform(random_);
   const double level = std::sqrt(1.0 - height * height);
   const double force = random->force * uniform(random_);

@@ -71,8 +71,12 @@ std::string Model::load(const char* path) {
              "' must drive degree of freedom nv - nu + " + std::to_string(i) + " with gear 1 (thrusters on sites come first)";
     }
   }
-  const int text = mj_name2id(m, mjOBJ_TEXT, "robot_digest");
-  if (text >= 0) robot_digest = std::strtoull(m->text_data + m->text_adr[text], nullptr, 0);
+  const auto text = [&](const char* name) {
+    const int i = mj_name2id(m, mjOBJ_TEXT, name);
+    return std::string(i >= 0 ? m->text_data + m->text_adr[i] : "");
+  };
+  robot_digest = std::strtoull(text("robot_digest").c_str(), nullptr, 0);
+  formula = text("formula");
   mj_forward(m, d);
   return "";
 }

@@ -33,6 +33,7 @@ struct Model {
   bool free_base = false;     // joint 0 is a free joint
   int hand_site = -1;         // site that is judged, or -1
   uint64_t robot_digest = 0;  // custom text "robot_digest" of the scene, 0 if it has none
+  std::string formula;        // custom text "formula": what moves the robot in MuJoCo's place (sim_formula.h), or empty
 
   ~Model();
   Model() = default;

@@ -55,7 +55,7 @@ class TomlFile:
         for head, end in itertools.pairwise(heads):
             if table and lines[head].split("#")[0].replace('"', "").strip(" \t[]") == table:
                 return next((n for n in found if head + 1 < n <= end), head + 1)
-        return next(found, 1)
+        return next(found, self.line(table.rpartition(".")[2]) if table else 1)
 
     def error(self, key: str, what: str, table: str = "") -> InputError:
         """The error to raise about `key` (of `table`). `what` ends with the mend."""

@@ -181,7 +181,9 @@ int Program::run() {
 int main(int argc, char** argv) {
   engram::io::Settings settings;
   int exit_code = 0;
-  const engram::io::Models models = {&engram_panda_reach, &engram_talos_stand, &engram_talos_walk, &engram_talos_pole, &engram_anymal_trot, &engram_hector_fly};
+  const engram::io::Models models = {&engram_panda_reach, &engram_talos_stand, &engram_talos_walk,     &engram_talos_pole,
+                                     &engram_anymal_trot, &engram_hector_fly,  &engram_pendulum_swing, &engram_unicycle_park,
+                                     &engram_bicopter_fly};
   if (!engram::io::read_settings(argc, argv, models, &settings, &exit_code)) return exit_code;
   return engram::io::Program(settings).run();
 }

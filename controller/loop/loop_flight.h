@@ -2,7 +2,7 @@
 #ifndef CONTROLLER_LOOP_LOOP_FLIGHT_H_
 #define CONTROLLER_LOOP_LOOP_FLIGHT_H_
 
-#include "controller/loop/loop_receding.h"
+#include "controller/loop/loop_way.h"
 #include "controller/ocp/ocp.h"
 #include "controller/ocp/ocp_frame.h"
 #include "controller/ocp/ocp_regularization.h"
@@ -91,53 +91,22 @@ template <class P> class HoverHold {
 };
 
 // Every knot asks for the way point, upright, at rest; thrusts within their limits (box of the solver).
-template <class Task_> class FlightModel {
+template <class R> using FlightProblem = Ocp<R, FramePoseTerm<R, R::kBase>, StateTerm<R>, TorqueTerm<R>>;
+template <class Task> class FlightModel : public WayModel<FlightModel<Task>, Task, FlightProblem<typename Task::Robot>, WayPoint> {
  public:
-  using Task = Task_;
-  using R = typename Task::Robot;
-  using P = Ocp<R, FramePoseTerm<R, R::kBase>, StateTerm<R>, TorqueTerm<R>>;
-  using Knot = typename P::template Knot<double>;
-  using Memory = NoMemory;
+  using Base = WayModel<FlightModel, Task, FlightProblem<typename Task::Robot>, WayPoint>;
+  using typename Base::Knot, typename Base::P, typename Base::R;
   using Hold = HoverHold<P>;
-  using Target = WayPoint;
-  static constexpr int N = Task::nknots, ntask = Task::ntask, kIterations = 1;
-  static constexpr int64_t kStepUs = static_cast<int64_t>(1e6 * Task::dt + 0.5), kTickUs = 10000;
-  static constexpr bool kBoxedControls = true;
-  // A gust opens gaps: the plan of before it would be worse than any. There are no limits of speed.
-  static constexpr double kLargestNearGap = 1e3, kLargestGap = 1e3, kLargestSpeed = 1e3;
-  static_assert(kStepUs % kTickUs == 0, "a knot is a whole number of ticks");
 
-  static bool target(const double* value, Target& t) {
+  static bool target(const double* value, WayPoint& t) {
     for (int i = 0; i < 3; ++i) t.p[i] = value[i];
     t.yaw = value[3];
-    return known(value);
-  }
-  static bool known(const double* value) {
-    for (int i = 0; i < ntask; ++i)
-      if (!(value[i] >= Task::task_lo[i] && value[i] <= Task::task_hi[i])) return false;
-    return true;
+    return Base::known(value);
   }
   static void path(const double* x, double (&p)[3]) { std::copy(x, x + 3, p); }
-
-  void begin(int64_t, const double*) {}
-  void take(int64_t, const Target& t) { target_ = t; }
-  void pose(const int64_t (&utime)[N + 1], const double*, Horizon<P, N>& h) const {
-    for (int k = 0; k <= N; ++k) {
-      const double dt = k < N ? 1e-6 * static_cast<double>(utime[k + 1] - utime[k]) : 0.0;
-      knot(dt, k == N, h.knot[k]);
-    }
-  }
-  // Hovers on.
-  void extend(const Horizon<P, N>& h, int k, const double* x, double* u, double* x_next) const {
-    double cost;
-    for (int i = 0; i < P::nu; ++i) u[i] = kHover;
-    P::calc(h.knot[k], x, u, x_next, cost);
-  }
-
- private:
-  static constexpr double kHover = -total_mass<R>() * R::gravity[2] / R::nu;  // N, each thruster
-
-  void knot(double dt, bool end, Knot& k) const {
+  static constexpr double rest(int) { return kHover; }
+  void aim(const double*, bool) {}
+  void knot(double dt, bool end, int, Knot& k) const {
     k.dt = dt;
     k.pose_w_p = end ? Task::terminal_position : dt * Task::weights_position;
     k.pose_w_R = end ? Task::terminal_rotation : dt * Task::weights_rotation;
@@ -156,7 +125,9 @@ template <class Task_> class FlightModel {
     }
   }
 
-  WayPoint target_;
+ private:
+  using Base::target_;
+  static constexpr double kHover = -total_mass<R>() * R::gravity[2] / R::nu;  // N, each thruster
 };
 
 }  // namespace engram

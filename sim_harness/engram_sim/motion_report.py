@@ -56,9 +56,11 @@ def base_path(motion: Motion) -> str:
     states = motion.messages["ENGRAM_STATE"]
     t = 1e-6 * states["utime"].astype(float)
     fig, ax = plots.figure(11.6, 3.0)
-    for axis, colour in zip(range(3), ("#e08a1e", "#7a8794", "#1769aa")):
-        ax.plot(t, states["q"][:, axis].astype(float), color=colour, linewidth=1.2, label="xyz"[axis])
-    ax.set(xlabel="plant time (s)", ylabel="base (m)", xlim=(0, t[-1] if len(t) else 1))
+    labels = motion.tree.joint_name[:3] if motion.tree.formula else list("xyz")
+    for axis, (label, colour) in enumerate(zip(labels, ("#e08a1e", "#7a8794", "#1769aa"))):
+        ax.plot(t, states["q"][:, axis].astype(float), color=colour, linewidth=1.2, label=label)
+    ylabel = "coordinates (m, rad)" if motion.tree.formula else "base (m)"
+    ax.set(xlabel="plant time (s)", ylabel=ylabel, xlim=(0, t[-1] if len(t) else 1))
     plots.legend_above(ax, 3)
     return plots.svg(fig)
 

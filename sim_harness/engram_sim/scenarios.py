@@ -140,8 +140,54 @@ def hector_fly(spec: MotionSpec, seed: int, parts: int | None) -> Script:
         p, yaw = rng.uniform([-2.0, -2.0, 0.5], [2.0, 2.0, 3.0]), rng.uniform(-3.0, 3.0)
         pose = [*p, 0.0, 0.0, np.sin(yaw / 2.0), np.cos(yaw / 2.0)]
         lines.append(f"jump {numbers(pose)}  {numbers([*p, yaw])}")
-    wind = ["--gust-period", "1", "--gust-force", "3", "--gust-duration", "1"]
-    return Script("series", lines, points, "base", ["--engine", "cvode", *wind, "--seed", str(seed)])
+    return Script("series", lines, points, "base", [*wind(3.0), "--seed", str(seed)])
+
+
+def wind(force: float) -> list[str]:
+    """The smooth plant, with gusts of at most `force` (N) about once a second."""
+    return ["--engine", "cvode", "--gust-period", "1", "--gust-force", repr(force), "--gust-duration", "1"]
+
+
+def goals(spec: MotionSpec, seed: int, site: str) -> list[str]:
+    """First lines of a series of goals, with the task's own [success]."""
+    success = {key: float(spec.constants[f"success_{key}"]) for key in ("position", "rotation", "time", "hold")}
+    lines = [f"hand {site}", f"window {success['time']!r}", f"hold {success['hold']!r}"]
+    return [*header(spec, "series", seed), *lines, f"tolerance {success['position']!r} {success['rotation']!r}"]
+
+
+def goal(p: list[float], axis: int, angle: float, task: list[float]) -> str:
+    """A goal at p (m), turned by `angle` (rad) about an axis of the world (0 to 2)."""
+    quaternion = [np.sin(angle / 2.0) * float(axis == i) for i in range(3)] + [np.cos(angle / 2.0)]
+    return f"jump {numbers(np.array([*p, *quaternion]))}  {numbers(np.array(task))}"
+
+
+def pendulum_swing(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """Swing-ups from random angles at rest, each held for some seconds; in gusts of wind."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    lines, swings = goals(spec, seed, "tip"), parts or 20
+    for _ in range(swings):
+        lines += [f"episode {numbers(np.array([rng.uniform(-np.pi, np.pi)]))}", goal([0.0, 0.0, 1.0], 1, 0.0, [0.0])]
+    return Script("series", lines, swings, "tip", [*wind(0.5), "--seed", str(seed)])
+
+
+def unicycle_park(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """Random way points with random headings, one after the other."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    lines, points = [*goals(spec, seed, "base"), "episode 0 0 0"], parts or 50
+    for _ in range(points):
+        x, y, yaw = rng.uniform([-2.0, -2.0, -3.0], [2.0, 2.0, 3.0])
+        lines.append(goal([x, y, 0.0], 2, yaw, [x, y, yaw]))
+    return Script("series", lines, points, "base", ["--engine", "cvode"])
+
+
+def bicopter_fly(spec: MotionSpec, seed: int, parts: int | None) -> Script:
+    """Random way points in the plane, in gusts of wind."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    lines, points = [*goals(spec, seed, "base"), "episode 0 1 0"], parts or 50
+    for _ in range(points):
+        x, z = rng.uniform([-3.0, 0.5], [3.0, 3.5])
+        lines.append(goal([x, 0.0, z], 1, 0.0, [x, z]))
+    return Script("series", lines, points, "base", [*wind(5.0), "--seed", str(seed)])
 
 
 MOTIONS: dict[str, Callable[[MotionSpec, int, int | None], Script]] = {
@@ -150,6 +196,9 @@ MOTIONS: dict[str, Callable[[MotionSpec, int, int | None], Script]] = {
     "talos_pole": talos_pole,
     "anymal_trot": anymal_trot,
     "hector_fly": hector_fly,
+    "pendulum_swing": pendulum_swing,
+    "unicycle_park": unicycle_park,
+    "bicopter_fly": bicopter_fly,
 }
 
 

@@ -1,4 +1,4 @@
-"""Plant and deployed controller of a robot that flies: a scenario, way points in both engines, and every mismatch told."""
+"""Plant and deployed controller of robots that fly, and of formulas: a scenario, way points, and every mismatch told."""
 
 from __future__ import annotations
 
@@ -71,6 +71,24 @@ def test_way_points_are_reached_in_gusts(arena: Arena, spec, engine: str) -> Non
     assert done.returncode == 0, done.stderr
     jumps = json.loads((arena.folder / "results.json").read_text())["jumps"]
     assert len(jumps) == 3 and all(jump["success"] and jump["torque_share"] <= 1.0 for jump in jumps)
+
+
+@pytest.mark.parametrize(("robot", "task", "parts"), [("pendulum", "swing", 1), ("unicycle", "park", 2), ("bicopter", "fly", 2)])
+def test_a_formula_is_driven_to_its_goals(arena: Arena, robot: str, task: str, parts: int) -> None:
+    """Swing-up and hold, parking, way points in gusts: the deployed controller, the CVODE plant."""
+    controller(arena, "--model", f"{robot}_{task}")
+    way = script(load_motion(robot, task), 3, parts)
+    path = arena.folder / "way.txt"
+    way.write(path)
+    done = plant(arena, "series", path, *way.plant_options, "--scene", scene(robot, task))
+    assert done.returncode == 0, done.stderr
+    jumps = json.loads((arena.folder / "results.json").read_text())["jumps"]
+    assert len(jumps) == parts and all(jump["success"] and jump["torque_share"] <= 1.0 for jump in jumps)
+
+
+def test_a_formula_is_not_left_to_mujoco(arena: Arena) -> None:
+    done = plant(arena, "scenario", write(arena, HOVER), "--scene", scene("pendulum", "swing"))
+    assert done.returncode == BAD_INPUT and "moved by the formula 'pendulum', not by MuJoCo; add --engine cvode" in done.stderr
 
 
 def test_the_same_seed_gives_the_same_script(spec, tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ u_lo = 0.5
 u_hi = 4.0
 
 """
+TORQUE = "control.torque = { u_lo = -5.0, u_hi = 5.0 }\n"
 TEXT = (ZOO / "robot.toml").read_text(encoding="utf-8")
 JOINTS = re.findall(r'joint name="(\w+)" type="(?!fixed)', (ZOO / "zoo.urdf").read_text(encoding="utf-8"))
 
@@ -39,6 +40,11 @@ def thruster(old: str, new: str) -> str:
     """A spoilt thruster, before the spheres."""
     assert old in THRUSTER
     return THRUSTER.replace(old, new) + "[spheres]"
+
+
+def formula(name: str, control: str) -> str:
+    """A robot that a formula moves."""
+    return f'formula = "{name}"\nfree_base = false\n{control}'
 
 
 @pytest.fixture()
@@ -154,6 +160,16 @@ def test_thrusters_push_where_they_sit(models):
     motors = ElementTree.fromstring(robot_mjcf(tree)).findall("actuator/motor")
     assert motors[0].get("site") == "jet" and motors[0].get("ctrlrange") == "0.5 4.0"
     assert "static constexpr double u_lo[" in robot_header(tree)
+
+
+def test_a_formula_brings_its_own_controls():
+    """They take the place of joint motors: two of them for three coordinates, with their own limits."""
+    tree = load("unicycle")
+    assert (tree.formula, tree.nv, tree.nu, tree.control_name) == ("unicycle", 3, 2, ["speed", "turn"])
+    assert list(tree.u_max) == [2.0, 4.0] and len(tree.u_lo) == 0 and list(load("bicopter").u_lo) == [0.0, 0.0]
+    root = ElementTree.fromstring(robot_mjcf(tree))
+    assert root.find("custom/text[@name='formula']").get("data") == "unicycle"
+    assert [motor.get("ctrlrange") for motor in root.iter("motor")] == ["-2.0 2.0", "-4.0 4.0"]
 
 
 def test_a_robot_without_thrusters_has_the_digest_it_always_had():
@@ -391,6 +407,42 @@ WRONG = {
         TEXT[TEXT.index("free_base") :],
         "free_base = false\nhome = {}\n[frames]\n" + THRUSTER,
         r":6: jet: a thruster needs a base that is free; write free_base = true",
+    ),
+    # of formulas
+    "unknown formula": (
+        "free_base = true",
+        formula("pendulun", TORQUE),
+        r":3: formula: there is no formula 'pendulun'; did you mean",
+    ),
+    "formula that floats": (
+        "home",
+        'formula = "bicopter"\nhome',
+        r":5: formula: a formula has neither a free base .*; write free_base",
+    ),
+    "formula alone": (
+        "free_base = true",
+        formula("bicopter", ""),
+        r":3: formula: a formula has controls, and only a formula; write",
+    ),
+    "controls alone": (
+        "free_base",
+        TORQUE + "free_base",
+        r":3: control: a formula has controls, and only a formula; write formula",
+    ),
+    "control upside down": (
+        "free_base = true",
+        formula("pendulum", TORQUE.replace("5.0 }", "-5.0 }")),
+        r":5: u_lo: the least control -5 is not below the largest -5; exchange or mend",
+    ),
+    "control without limit": (
+        "free_base = true",
+        formula("pendulum", TORQUE.replace(", u_hi = 5.0", "")),
+        r":5: \[control\.torque\]: key 'u_hi' is missing; add it",
+    ),
+    "too many controls": (
+        "free_base = true",
+        formula("bicopter", "".join(TORQUE.replace("torque", f"u{i}") for i in range(9))),
+        r":5: control: more controls than the \d coordinates of zoo\.urdf; delete some",
     ),
 }
 

@@ -18,6 +18,7 @@ FORBIDDEN = (
     "puts abort __assert_fail pthread_mutex_lock __cxa_guard_acquire _ZSt20__throw_length_errorPKc"
 ).split()
 MODELS = ["panda_reach", "talos_stand", "talos_walk", "talos_pole", "anymal_trot", "hector_fly"]
+MODELS += ["pendulum_swing", "unicycle_park", "bicopter_fly"]
 ARCHIVES = [*(f"controller/libengram_{name}.a" for name in MODELS), "controller/tab/libengram_tab.a"]
 
 

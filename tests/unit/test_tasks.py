@@ -58,7 +58,10 @@ def test_committed_files_are_what_the_command_writes(spec):
     assert (folder / "scene.xml").read_text(encoding="utf-8") == scene
 
 
-@pytest.mark.parametrize("robot, task", [("talos", "stand"), ("anymal", "trot"), ("hector", "fly")])
+MOTIONS = ["talos stand", "anymal trot", "hector fly", "pendulum swing", "unicycle park", "bicopter fly"]
+
+
+@pytest.mark.parametrize("robot, task", [tuple(motion.split()) for motion in MOTIONS])
 def test_committed_files_of_motions_are_what_the_command_writes(robot, task):
     motion, folder = load_motion(robot, task), ROOT / "tables" / f"{robot}_{task}"
     scene = scene_mjcf(motion, ROOT / f"tables/{robot}/robot.xml", MODELS / robot / task / "world.xml", folder)

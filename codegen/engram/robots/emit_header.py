@@ -57,7 +57,7 @@ def robot_header(tree: Tree) -> str:
     coordinates = [
         n for i, n in enumerate(joints) for n in ([f"{n} {a}" for a in "x y z qx qy qz qw".split()] if tree.kind[i] == 0 else [n])
     ]
-    controls = [*tree.thruster_name, *dofs[6 if tree.kind[0] == 0 else 0 :]]
+    controls = tree.control_name or [*tree.thruster_name, *dofs[6 if tree.kind[0] == 0 else 0 :]]
     guard = f"TABLES_{tree.name.upper()}_ROBOT_H_"
     upper = np.triu_indices(3)
     spheres = [f"{joints[j]}" for j in tree.sphere_joint]
@@ -74,6 +74,11 @@ def robot_header(tree: Tree) -> str:
         "",
         "namespace engram::robots {",
         "",
+        *(
+            [f"// Moved by a formula (controller/ocp/ocp_systems.h, {tree.formula}): bodies are what is seen."]
+            if tree.formula
+            else []
+        ),
         f"struct {camel(tree.name)} {{",
         f'  static constexpr char name[] = "{tree.name}";',
         f"  static constexpr uint64_t digest = 0x{tree.digest:016x};  // of the numbers below",

@@ -40,6 +40,8 @@ def robot_mjcf(tree: Tree, visuals: list[Visual] = (), mesh_folder: str = "", di
     ElementTree.SubElement(root, "option", gravity=words(tree.gravity), timestep="0.001")
     custom = ElementTree.SubElement(root, "custom")
     ElementTree.SubElement(custom, "text", name="robot_digest", data=f"0x{tree.digest if digest is None else digest:016x}")
+    if tree.formula:
+        ElementTree.SubElement(custom, "text", name="formula", data=tree.formula)
     asset = ElementTree.SubElement(root, "asset")
     for visual in visuals:
         if visual.kind == "mesh":
@@ -52,15 +54,16 @@ def robot_mjcf(tree: Tree, visuals: list[Visual] = (), mesh_folder: str = "", di
         bodies.append(_add_body(parent, tree, i))
         _add_visuals(bodies[i], visuals, i)
     actuator = ElementTree.SubElement(root, "actuator")
-    moved = [i for i in range(tree.nj) if tree.kind[i] != FREE]
+    moved = [tree.joint_name[i] for i in range(tree.nj) if tree.kind[i] != FREE]
+    if tree.formula:  # the last joints carry its controls, for their ranges; they do not drive
+        moved = moved[len(moved) - len(tree.control_name) :]
     for name, twist, lo, hi in zip(tree.thruster_name, tree.twist, tree.u_lo, tree.u_max):
         gear = words([0, 0, 1, 0, 0, twist])
         ElementTree.SubElement(actuator, "motor", name=name, site=name, gear=gear, ctrllimited="true", ctrlrange=words([lo, hi]))
     n = len(tree.thruster_name)
     u_hi, u_lo = tree.u_max[n:], tree.u_lo[n:] if len(tree.u_lo) else -tree.u_max
-    for i, lo, hi in zip(moved, u_lo, u_hi):
-        name = tree.joint_name[i]
-        ElementTree.SubElement(actuator, "motor", name=name, joint=name, ctrllimited="true", ctrlrange=words([lo, hi]))
+    for joint, name, lo, hi in zip(moved, tree.control_name or moved, u_lo, u_hi):
+        ElementTree.SubElement(actuator, "motor", name=name, joint=joint, ctrllimited="true", ctrlrange=words([lo, hi]))
     keyframe = ElementTree.SubElement(root, "keyframe")
     ElementTree.SubElement(keyframe, "key", name="home", qpos=words(_qpos(tree)))
     ElementTree.indent(root)

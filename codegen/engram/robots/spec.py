@@ -24,9 +24,12 @@ KEYS = [
     "spheres",
     "feet",
     "thruster",
+    "formula",
+    "control",
 ]
 JOINT_KEYS = ["armature", "q_lo", "q_hi", "v_max", "u_max", "u_lo"]
 PLANAR_BASE = ["base_x", "base_y", "base_yaw"]  # its joints: m, m, rad; world axes, then about the vertical
+FORMULAS = ["pendulum", "unicycle", "bicopter"]  # controller/ocp/ocp_systems.h, sim_harness/sim_formula.cc
 THRUSTER_KEYS = ["link", "position", "axis", "twist", "u_lo", "u_hi"]
 
 
@@ -41,6 +44,15 @@ class Thruster:
     twist: float  # N m per N
     u_lo: float  # N
     u_hi: float  # N
+
+
+@dataclass(frozen=True)
+class Control:
+    """An input of a formula (units are the formula's)."""
+
+    name: str
+    u_lo: float
+    u_hi: float
 
 
 @dataclass(frozen=True)
@@ -63,6 +75,8 @@ class RobotSpec:
     spheres: dict[str, np.ndarray]  # link -> (n, 4): centre in link axes, radius
     feet: dict[str, np.ndarray]  # frame -> radius of a ball about its origin (1), or half sizes of a box that stands on it (3)
     thrusters: list[Thruster]
+    formula: str  # one of FORMULAS that moves the robot; empty: rigid-body dynamics
+    controls: list[Control]  # of the formula, instead of joint motors
 
     @property
     def source(self) -> str:
@@ -136,7 +150,34 @@ def read_spec(name: str, models: Path = MODELS) -> RobotSpec:
         spheres=spheres,
         feet=feet,
         thrusters=[_thruster(file, name) for name in file.table("thruster")],
+        formula=_formula(file),
+        controls=[_control(file, name) for name in file.table("control")],
     )
+
+
+def _formula(file: TomlFile) -> str:
+    """The formula that moves the robot, or an empty text."""
+    formula = file.words("formula", file.data["formula"]) if "formula" in file.data else ""
+    if formula and formula not in FORMULAS:
+        raise file.error("formula", f"there is no formula '{formula}'; {closest(formula, FORMULAS)}")
+    if formula and (file.data["free_base"] or "thruster" in file.data):
+        raise file.error(
+            "formula", "a formula has neither a free base nor thrusters; write free_base = false, and its [control.*]"
+        )
+    if bool(formula) != bool(file.table("control")):
+        key = "formula" if formula else "control"
+        raise file.error(key, "a formula has controls, and only a formula; write formula = ... and its [control.*], or neither")
+    return formula
+
+
+def _control(file: TomlFile, name: str) -> Control:
+    """One [control.<name>]."""
+    table, values = f"control.{name}", file.table(name, "control")
+    file.check_keys(values, ["u_lo", "u_hi"], required=["u_lo", "u_hi"], table=table)
+    u_lo, u_hi = (float(file.numbers(key, values[key], (), table)) for key in ("u_lo", "u_hi"))
+    if u_lo >= u_hi:
+        raise file.error("u_lo", f"the least control {u_lo:g} is not below the largest {u_hi:g}; exchange or mend them", table)
+    return Control(name, u_lo, u_hi)
 
 
 def _thruster(file: TomlFile, name: str) -> Thruster:

@@ -44,7 +44,7 @@ class Tree:
     q_lo: np.ndarray
     q_hi: np.ndarray
     v_max: np.ndarray
-    u_max: np.ndarray  # (nu) thrusters first, then joints
+    u_max: np.ndarray  # (nu) thrusters first, then joints or the controls of a formula
     u_lo: np.ndarray  # (nu), or empty: -u_max
     actuation: np.ndarray  # (nv, nu): tau = actuation u, or empty: u drives the last nu dofs
     q_home: np.ndarray
@@ -61,6 +61,8 @@ class Tree:
     p_BT: np.ndarray  # (nthruster, 3) m, base axes
     axis_B: np.ndarray  # (nthruster, 3) unit vectors, base axes
     twist: np.ndarray  # (nthruster) N m per N
+    formula: str  # that moves the robot, or empty
+    control_name: list[str]  # of the formula: they take the place of joint motors
     R_turn: np.ndarray  # (nj, 3, 3) joint axes -> Pinocchio's axes of the same body
     continuous: np.ndarray  # (nj) bool
     model: pin.Model  # locked joints removed, armature and gravity set
@@ -127,8 +129,8 @@ def build(spec: RobotSpec) -> Tree:
     frames = [_frame(spec, model, R_turn, name, link, "frames") for name, link in spec.frames.items()]
     p_BT, axis_B = _thrusters(spec, model)
     twist = np.array([t.twist for t in spec.thrusters])
-    joint_u_max, joint_u_lo = _joint_forces(spec, model)
-    one_sided = bool(spec.thrusters) or np.any(joint_u_lo != -joint_u_max)
+    driven_u_max, driven_u_lo = _controls(spec) if spec.formula else _joint_forces(spec, model)
+    one_sided = bool(spec.thrusters) or np.any(driven_u_lo != -driven_u_max)
     spheres = [(_frame(spec, model, R_turn, link, link, "spheres"), row) for link, rows in spec.spheres.items() for row in rows]
     tree = Tree(
         name=spec.name,
@@ -147,8 +149,8 @@ def build(spec: RobotSpec) -> Tree:
         q_lo=np.clip(q_lo, -NO_LIMIT, NO_LIMIT),
         q_hi=np.clip(q_hi, -NO_LIMIT, NO_LIMIT),
         v_max=np.clip(model.velocityLimit, 0.0, NO_LIMIT),
-        u_max=np.concatenate([[t.u_hi for t in spec.thrusters], joint_u_max]),
-        u_lo=np.concatenate([[t.u_lo for t in spec.thrusters], joint_u_lo]) if one_sided else np.zeros(0),
+        u_max=np.concatenate([[t.u_hi for t in spec.thrusters], driven_u_max]),
+        u_lo=np.concatenate([[t.u_lo for t in spec.thrusters], driven_u_lo]) if one_sided else np.zeros(0),
         actuation=_actuation(p_BT, axis_B, twist, model.nv) if spec.thrusters else np.zeros((0, 0)),
         q_home=np.zeros(len(q_lo)),
         gravity=spec.gravity,
@@ -164,6 +166,8 @@ def build(spec: RobotSpec) -> Tree:
         p_BT=p_BT,
         axis_B=axis_B,
         twist=twist,
+        formula=spec.formula,
+        control_name=[c.name for c in spec.controls],
         R_turn=R_turn,
         continuous=continuous,
         model=model,
@@ -276,6 +280,11 @@ def _override(spec: RobotSpec, model: pin.Model) -> None:
             array[i] = values.get(key, array[i])
 
 
+def _controls(spec: RobotSpec) -> tuple[np.ndarray, np.ndarray]:
+    """Largest and least controls of a formula."""
+    return np.array([c.u_hi for c in spec.controls]), np.array([c.u_lo for c in spec.controls])
+
+
 def _joint_forces(spec: RobotSpec, model: pin.Model) -> tuple[np.ndarray, np.ndarray]:
     """Largest and least forces of the joints; the least is -u_max unless robot.toml says otherwise."""
     u_max = np.clip(model.effortLimit, 0.0, NO_LIMIT)
@@ -346,6 +355,8 @@ def _actuation(p_BT: np.ndarray, axis_B: np.ndarray, twist: np.ndarray, nv: int)
 
 def check(spec: RobotSpec, tree: Tree) -> None:
     """Refuse trees that the controller or MuJoCo could not simulate. Raises InputError."""
+    if len(tree.control_name) > tree.nv:
+        raise spec.file.error("control", f"more controls than the {tree.nv} coordinates of {spec.urdf.name}; delete some")
     if not any(tree.nsub):
         raise spec.file.error("locked", "nothing moves; leave a joint free, or write free_base = true")
     for i, name in enumerate(tree.joint_name):
