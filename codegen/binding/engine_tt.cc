@@ -32,6 +32,21 @@ class TensorTrain {
     return nb::make_tuple(value.release(), gradient.release(), statuses);
   }
 
+  nb::tuple distance(const In<2>& p) {
+    check_shape<2>("p", p, {-1, 3});
+    if (tab_->d != 3) throw nb::value_error("a distance is a train over x, y, z");
+    const std::size_t m = p.shape(0);
+    NewArray distance({m}), gradient({m, 3});
+    nb::list statuses;
+    for (std::size_t i = 0; i < m; ++i) {
+      float d, g[3];
+      statuses.append(int(tab_tt_distance(tab_, p.data() + i * 3, &d, g)));
+      distance.data()[i] = d;
+      for (int j = 0; j < 3; ++j) gradient.row(i)[j] = g[j];
+    }
+    return nb::make_tuple(distance.release(), gradient.release(), statuses);
+  }
+
   int condition(const In<1>& x, const nb::ndarray<const bool, nb::ndim<1>, nb::c_contig, nb::device::cpu>& fixed) {
     check_shape<1>("x", x, {tab_->d});
     if (long(fixed.shape(0)) != tab_->d) throw nb::value_error("fixed: as many as there are variables");
@@ -82,6 +97,7 @@ void bind_tensor_train(nb::module_& engine) {
   nb::class_<TensorTrain>(engine, "TensorTrain", "controller/tab's tensor train on a table of engram.emit.kinds.Tt.")
       .def(nb::init<const nb::object&, int>(), "table"_a, "capacity"_a = 1000)
       .def("value", &TensorTrain::value, "x"_a, "(density (m), gradient (m, d), status (m)) at x (m, d).")
+      .def("distance", &TensorTrain::distance, "p"_a, "(signed distance (m), gradient (m, 3), status (m)) of a train over x, y, z.")
       .def("condition", &TensorTrain::condition, "x"_a, "fixed"_a, "Conditions on the variables that are fixed; the status.")
       .def("sample", &TensorTrain::sample, "alpha"_a, "count"_a, "seed"_a = 1, "(x (count, d), log probability (count)).")
       .def("time_us", [](TensorTrain& t, double alpha, int count, std::size_t repeats) { return t.time_us(alpha, count, repeats).release(); },

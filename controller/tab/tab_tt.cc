@@ -61,6 +61,24 @@ TabStatus tab_tt_value(const TabTt* tab, const double* x, double* value, double*
   return status;
 }
 
+TabStatus tab_tt_distance(const TabTt* tab, const double* p, float* distance, float* gradient) {
+  *distance = 0;
+  for (int i = 0; gradient && i < 3; ++i) gradient[i] = 0;
+  if (tab->d != 3) return kTabBad;
+  double value, slope[3];
+  const TabStatus status = tab_tt_value(tab, p, &value, gradient ? slope : nullptr);
+  if (status == kTabNotFinite) return status;
+  double beyond[3], far = 0;
+  for (int i = 0; i < 3; ++i) {
+    beyond[i] = p[i] - std::fmin(std::fmax(p[i], tab_lo(&tab->head)[i]), tab_hi(&tab->head)[i]);
+    far = std::hypot(far, beyond[i]);
+  }
+  *distance = static_cast<float>(value + far);
+  // beyond a border the nearest point of the domain no longer moves along its axis: the train's slope is 0 there
+  for (int i = 0; gradient && i < 3; ++i) gradient[i] = static_cast<float>(beyond[i] != 0 ? beyond[i] / far : slope[i]);
+  return status;
+}
+
 void tab_lowest(const double* cost, int32_t n, int32_t k, int32_t* index) {
   for (int32_t j = 0; j < k; ++j) index[j] = -1;
   for (int32_t i = 0; i < n; ++i) {

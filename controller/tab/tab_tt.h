@@ -35,6 +35,11 @@ static inline int32_t tab_tt_width(int32_t r) { return r == 1 ? 1 : tab_pad(r); 
  * trains neither overflow nor vanish. Work: 2 sum r_k-1 r_k multiply-adds, twice that with the gradient; 36 kB of stack. */
 TabStatus tab_tt_value(const TabTt* tab, const double* x, double* value, double* gradient);
 
+/* A train over x, y, z [m] as a signed distance [m]: its value at the nearest point of its domain, plus the distance to that point; and
+ * its gradient (3) [-] unless NULL. Not finite: 0, gradient 0. kTabBad if the train has not three variables. Fitted by
+ * engram.learn.distance. */
+TabStatus tab_tt_distance(const TabTt* tab, const double* p, float* distance, float* gradient);
+
 /* Draws samples of the free variables given the fixed ones. All its memory is the caller's. */
 typedef struct TabTtSampler {
   const TabTt* tab;

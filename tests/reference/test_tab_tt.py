@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.interpolate import RegularGridInterpolator
 
 from engram.emit import Tt
 from engram.engine import engine
+from engram.learn.distance import distance_train
+from engram.paths import MODELS
+from engram.tasks.world import Boxes, read_boxes
 
 OK, OUTSIDE, NOT_FINITE = 0, 1, 2
 ULP = 2.0**-24  # half a unit in the last place of a float, relative
@@ -182,6 +186,51 @@ def test_a_train_of_zeros_samples_uniformly() -> None:
     x, log_prob = engine.TensorTrain(table, 640).sample(0.5, 640)
     np.testing.assert_allclose(log_prob, -2 * np.log(8), atol=1e-6)
     assert len(np.unique(x[:, 0])) == 8
+
+
+@pytest.fixture(scope="module")
+def world() -> Boxes:
+    return read_boxes(MODELS / "panda" / "reach" / "world.xml")
+
+
+def nearest(world: Boxes):
+    return lambda p: world.distance(p).min(axis=1)
+
+
+def test_a_train_of_distances_is_the_grid_it_was_made_of(world: Boxes) -> None:
+    """Untruncated, at the nodes and between them: scipy's trilinear interpolation of the same numbers."""
+    lo, hi = np.array([0.0, -0.6, 0.0]), np.array([1.0, 0.6, 0.9])
+    table = distance_train(nearest(world), lo, hi, 13, rms=0.0, type="float32")
+    axes = [np.linspace(a, b, 13) for a, b in zip(lo, hi, strict=True)]
+    values = nearest(world)(np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)).reshape(13, 13, 13)
+    p = np.random.default_rng(1).uniform(lo, hi, (10_000, 3))
+    tt = engine.TensorTrain(table)
+    d, gradient, status = tt.distance(p)
+    np.testing.assert_allclose(d, RegularGridInterpolator(axes, values)(p), atol=200 * ULP)  # ranks 13, two sums of such
+    assert set(status) == {OK}
+    step = 1e-4
+    for i in range(3):
+        e = step * np.eye(3)[i]
+        numeric = (tt.distance(p + e)[0] - tt.distance(p - e)[0]) / (2 * step)
+        assert np.quantile(np.abs(numeric - gradient[:, i]), 0.98) < 5e-3  # a cell's border may lie between
+    outside = np.array([[0.5, 0.1, 1.3], [1.3, 0.1, 1.3]])
+    inner = tt.distance(np.minimum(outside, hi))[0]
+    d, gradient, status = tt.distance(outside)
+    np.testing.assert_allclose(d - inner, [0.4, 0.5], atol=1e-6)
+    np.testing.assert_allclose(gradient[:, 2], [1, 0.8], atol=1e-6)
+    assert status == [OUTSIDE, OUTSIDE]
+    assert tt.distance(np.full((1, 3), np.nan))[0][0] == 0
+
+
+def test_a_truncated_train_of_distances_is_small_and_says_its_error(world: Boxes) -> None:
+    lo, hi = np.array([0.0, -0.6, 0.0]), np.array([1.0, 0.6, 0.9])
+    table = distance_train(nearest(world), lo, hi, 48, rms=2e-3)
+    assert engine.TensorTrain(table).bytes < 48**3 / 2  # of the grid in as many bits
+    p = np.random.default_rng(2).uniform(lo, hi, (10_000, 3))
+    worst = np.abs(engine.TensorTrain(table).distance(p)[0] - nearest(world)(p)).max()
+    assert 0.5 * worst < table.held_out_error < 2 * worst and worst < 0.03
+    with pytest.raises(ValueError, match="x, y, z"):
+        engine.TensorTrain(random_train([3, 3], [2], seed=1)).distance(p)
 
 
 def test_what_is_not_finite_says_so() -> None:

@@ -7,7 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from engram.engine import engine
+from engram.learn.contenders import table_bytes
 from engram.paths import MODELS
+from engram.study.learned_modes import learners, offers
 from engram.study.report import Report
 from engram.study.trains import WORKERS, Recipe, build, samples
 from engram.study.warmstart import ALPHAS, COUNTS, Neighbours, compare, modes
@@ -90,6 +92,8 @@ def run(row: str, quick: bool) -> None:
     neighbours = Neighbours(cost, draw, recipe, built.train.bytes, seed=3003)
     compare(report, cost, built, neighbours, validation, test, recipe.evaluations, THESIS[row], counts)
     count_modes(report, cost, built, neighbours, test[: 10 if quick else 100], recipe.evaluations, study.joints)
+    if row == "6.3":
+        count_learned_modes(report, cost, neighbours, test[: 10 if quick else 100], recipe.evaluations, study.joints)
     other_subsets(report, cost, built, neighbours, test[: 10 if quick else 100])
     report.close()
 
@@ -104,6 +108,16 @@ def count_modes(report, cost, built, neighbours, tasks, evaluations: int, joints
     found = modes(cost, np.stack([neighbours.starts(cost, task, 20) for task in tasks]), evaluations, joints)
     report.figure("modes.knn", found, n=len(tasks))
     report.say("distinct solutions among 20 refined: " + ", ".join(parts) + f", 20 neighbours: {found:.1f}")
+
+
+def count_learned_modes(report, cost, neighbours, tasks, evaluations: int, joints: slice) -> None:
+    """The same of learners fitted to the neighbours' solutions: their 20 most probable answers."""
+    parts = []
+    for name, table in learners(neighbours.x, cost.ntask, 20):
+        found = modes(cost, offers(table, cost, tasks, 20), evaluations, joints)
+        report.figure(f"modes.{name}", found, n=len(tasks))
+        parts.append(f"{name}: {found:.1f} ({table_bytes(table)} B)")
+    report.say("distinct solutions among the 20 most probable answers, refined: " + ", ".join(parts))
 
 
 def other_subsets(report, cost, built, neighbours, tasks: np.ndarray, count: int = 100) -> None:
