@@ -174,9 +174,9 @@ template <class M, class S, bool slopes> struct ArmMotion {
   S q0[nq], q1[nq], w[nw];         // ends and weights, w[Primitive::kBasis k + j] of joint k
   S dq0[nq], dq1[nq], dw[nw];      // gradient, added to
 
-  // weight_o * obstacles summed over the path + weight_l * length; length: mean of the joints' path [rad, root mean square] and the
-  // frame's [m]
-  S cost(double weight_o, double weight_l) {
+  // weight_o * obstacles summed over the path + weight_l * length + weight_R * orientation, mean over the path; length: mean of the
+  // joints' path [rad, root mean square] and the frame's [m]
+  S cost(double weight_o, double weight_l, double weight_R = 0.0) {
     constexpr int G = Primitive::kGrid, W = Primitive::kWindow, P = Primitive::kPoints;
     S z[nq][G + 1], z_bar[nq][G + 1], c = 0.0;
     for (int k = 0; k < nq; ++k)
@@ -206,6 +206,13 @@ template <class M, class S, bool slopes> struct ArmMotion {
       Mat3<S> R_WF;
       Vec3<S> p_WF;
       rbd_frame_placement(posture.d, M::frame, R_WF, p_WF);
+      if constexpr (M::space == 3) {
+        if (weight_R > 0 && o > 0) {
+          Vec3<S> moment;
+          c += (weight_R / (P - 1)) * M::template orientation<S>(R_WF, moment);
+          posture.twist(R::frame_joint[M::frame], moment * S(weight_R / (P - 1)));
+        }
+      }
       Vec3<S> J[nq], unit;
       for (int k = 0; k < nq; ++k) J[k] = cross_add(posture.d.J[k].ang, p_WF, posture.d.J[k].lin);
       if (o > 0) {
@@ -297,7 +304,7 @@ template <class M, int stops, bool home_again> struct MotionCost {
 };
 
 // One motion between two given postures, its weights x alone to be found (B.6):
-//   C = 1/2 (C_obst / 0.1 + C_control / 2)
+//   C = 1/3 (C_obst / 0.1 + C_control / 2 + C_orient / 0.2),   C_orient of the whole way; in the plane 1/2, no C_orient
 template <class M> struct TransferCost {
   using R = typename M::Robot;
   static constexpr int ntask = 0, d = Primitive::kBasis * R::nq;
@@ -319,7 +326,8 @@ template <class M> struct TransferCost {
       motion.w[k] = x[k];
       motion.dw[k] = 0.0;
     }
-    const S c = motion.cost(0.5 / 0.1, 0.5 / 2);
+    constexpr double share = 1.0 / ArmTerms<M, S, slopes>::kinds;
+    const S c = motion.cost(share / 0.1, share / 2, share / 0.2);
     if constexpr (slopes)
       for (int k = 0; k < d; ++k) gradient[k] = motion.dw[k];
     return c;
