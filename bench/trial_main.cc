@@ -5,6 +5,9 @@
 // heading [deg] of the robot at the start; task=<s>:<task vector>; push=<s>:<N s forward>,<N s left> over 0.1 s at the torso or base, in the
 // axes of the start's heading. Tasks and pushes may be repeated. Ends early if the robot falls.
 //
+// What the controller is not told: load=<kg> at the torso or base; friction=<mu> of the ground; delay=<s> from a command to its effect
+// (it is told of told=<s>); uneven=<m>: every touch-down is so much early or late, in turn for each foot (its ground is level, or raised by so much).
+//
 //   engram-trial <robot>_<task> limits       capture-point limits of pushes forward, back, left, right without a step [N s]
 //
 // Output: one row of kColumns doubles per control period (native byte order), see `Row`.
@@ -43,9 +46,11 @@ struct Row {
   double slip;                           // m, farthest horizontal distance of a foot from where it was at the start
   double torque;                         // largest |tau| / limit since the last row
   double status, rung, cost;
+  double swing, com_wanted[3];           // feet asked to be in the air, bit f for foot f; m
+  double foot[4][4], foothold[4][4];     // where feet are, and where they are asked to stand or land: x, y, z [m], heading [rad]
   double pose_us, linearize_us, backward_us, rollout_us, total_us;  // CPU time of the period
 };
-static_assert(sizeof(Row) == 19 * sizeof(double), "the reader counts on it (codegen/engram/prove/trial.py)");
+static_assert(sizeof(Row) == 55 * sizeof(double), "the reader counts on it (codegen/engram/prove/trial.py)");
 
 struct Event {
   double at;
@@ -57,6 +62,12 @@ Event event(const char* text) {
   while (*end == ':' || *end == ',') e.values.push_back(std::strtod(end + 1, &end));
   return e;
 }
+
+// Ground that changes under a foot in the air.
+struct Ground {
+  bool raised = false, changed = false;
+};
+constexpr double kInTheAir = 0.03, kOnGround = 0.015;  // m, of a sole's centre
 
 const Model* find(const std::string& name) {
   for (const Model& m : kModels) {
@@ -92,7 +103,7 @@ int main(int argc, char** argv) {
       std::printf("%.17g\n", capture_limit(plant, chosen->feet, way[0], way[1]));
     return 0;
   }
-  double seconds = 5.0, heading = 0.0;
+  double seconds = 5.0, heading = 0.0, load = 0.0, friction = 0.0, delay = 0.0, told = 0.0, uneven = 0.0;
   std::vector<Event> tasks, pushes;
   for (int i = 2; i < argc; ++i) {
     const std::string text = argv[i], key = text.substr(0, text.find('='));
@@ -100,6 +111,11 @@ int main(int argc, char** argv) {
     if (key == "seconds") seconds = std::atof(value);
     else if (key == "heading") heading = std::atof(value) * M_PI / 180.0;
     else if (key == "task") tasks.push_back(event(value));
+    else if (key == "load") load = std::atof(value);
+    else if (key == "friction") friction = std::atof(value);
+    else if (key == "delay") delay = std::atof(value);
+    else if (key == "told") told = std::atof(value);
+    else if (key == "uneven") uneven = std::atof(value);
     else if (key == "push") pushes.push_back(event(value));
     else bench::fail("engram-trial: unknown argument " + text);
   }
@@ -107,7 +123,13 @@ int main(int argc, char** argv) {
   engram_options options;
   engram_default_options(chosen->model, &options);
   options.clock = bench::thread_us;
+  options.delay_us = static_cast<int64_t>(1e6 * told + 0.5);
   LeggedPlant plant(chosen->model, heading);
+  if (load > 0.0) plant.add_mass(chosen->pushed, load);
+  if (friction > 0.0) plant.friction(friction);
+  plant.delay(static_cast<int>(1e6 * delay / LeggedPlant::kStepUs + 0.5));
+  std::vector<Ground> grounds(chosen->feet.size());
+  for (size_t f = 1; f < grounds.size(); f += 2) grounds[f].raised = true;  // feet are not raised at the same time
   LeggedController controller(chosen->model, &options);
   if (controller.error != ENGRAM_NO_ERROR) bench::fail(engram_error_text(controller.error));
   const int64_t tick = engram_describe(chosen->model)->tick_us;
@@ -130,18 +152,36 @@ int main(int argc, char** argv) {
       if (at(p.at)) plant.push(chosen->pushed, {c * x - s * y, s * x + c * y, 0.0});
       if (at(p.at + kPushSeconds)) plant.push(chosen->pushed, {0.0, 0.0, 0.0});
     }
+    for (size_t f = 0; uneven != 0.0 && f < grounds.size(); ++f) {
+      Ground& g = grounds[f];
+      const double height = foot(f)[2];
+      if (height < kOnGround) g.changed = false;
+      if (height < kInTheAir || g.changed) continue;
+      g.changed = true;
+      g.raised = !g.raised;
+      plant.raise_ground(chosen->feet[f], g.raised ? uneven : 0.0);
+    }
     const bool ticked = plant.utime % tick == 0;
     controller.step(plant);
     for (size_t i = 0; i < controller.tau.size(); ++i)
       torque = std::max(torque, std::fabs(controller.tau[i]) / plant.model()->actuator_ctrlrange[2 * i + 1]);
     if (!ticked) continue;
     const engram_cycle& c = controller.cycle();
-    Row row = {1e-6 * static_cast<double>(plant.utime), {}, {}, plant.base_up(), plant.yaw(), 0.0, torque, double(c.status),
-               double(c.rung), c.cost, c.query_us, c.linearize_us, c.backward_us, c.rollout_us, c.total_us};
+    Row row = {};
+    row.time = 1e-6 * static_cast<double>(plant.utime), row.up = plant.base_up(), row.yaw = plant.yaw(), row.torque = torque;
+    row.status = c.status, row.rung = c.rung, row.cost = c.cost, row.swing = c.legs.swing;
+    row.pose_us = c.query_us, row.linearize_us = c.linearize_us, row.backward_us = c.backward_us, row.rollout_us = c.rollout_us;
+    row.total_us = c.total_us;
     std::memcpy(row.com, plant.com, sizeof row.com);
     std::memcpy(row.com_velocity, plant.com_velocity, sizeof row.com_velocity);
-    for (size_t f = 0; f < chosen->feet.size(); ++f)
+    std::memcpy(row.com_wanted, c.legs.com, sizeof row.com_wanted);
+    std::memcpy(row.foothold, c.legs.foot, sizeof row.foothold);
+    for (size_t f = 0; f < chosen->feet.size(); ++f) {
       row.slip = std::max(row.slip, std::hypot(foot(f)[0] - start[2 * f], foot(f)[1] - start[2 * f + 1]));
+      const mjtNum* const R = plant.data()->geom_xmat + 9 * mj_name2id(plant.model(), mjOBJ_GEOM, chosen->feet[f]);
+      std::memcpy(row.foot[f], foot(f), 3 * sizeof(double));
+      row.foot[f][3] = std::atan2(R[3], R[0]);
+    }
     torque = 0.0;
     std::fwrite(&row, sizeof row, 1, stdout);
     if (!(row.up > 0.7)) break;  // fallen

@@ -30,6 +30,7 @@ engram_error check(const engram_model& model, const engram_options& o) {
       !within(static_cast<double>(o.off_after_us), gap, 100 * kSecond)) {
     return ENGRAM_ERROR_WATCHDOG;
   }
+  if (!within(static_cast<double>(o.delay_us), 0, ENGRAM_DELAY_MAX_US)) return ENGRAM_ERROR_DELAY;
   return ENGRAM_NO_ERROR;
 }
 
@@ -47,6 +48,7 @@ constexpr const char* kErrors[] = {
     "options.budget_us must be 0 to 1e6 us, and a budget needs options.clock",
     "options.torque_rate must be positive, clearance_min within 1 m, switch_gain 0 to 1, hold_rate 1 to 100 rad/s",
     "options.state_gap_us and plan_age_us must be at least one tick, off_after_us at least state_gap_us, all at most 100 s",
+    "options.delay_us must be 0 to 50000 us",
     "the memory's tables do not belong to this robot and task: run 'make tables' and build again",
 };
 constexpr const char* kStatuses[] = {

@@ -29,6 +29,8 @@ extern "C" {
 #define ENGRAM_NTASK_MAX 32   // bound on the length of a task vector
 #define ENGRAM_KNOTS_MAX 64   // bound on the knots of a plan
 #define ENGRAM_GUESSES_MAX 32 // bound on the candidates of one cycle
+#define ENGRAM_DELAY_MAX_US 50000
+#define ENGRAM_FEET_MAX 4     // bound on the feet of a robot
 
 typedef struct engram_controller engram_controller;  // one controller, living in the caller's memory
 typedef struct engram_model engram_model;            // one robot, task and memory, compiled in; read-only
@@ -75,6 +77,7 @@ typedef enum engram_error {
   ENGRAM_ERROR_BUDGET,      // options.budget_us, or a budget without a clock
   ENGRAM_ERROR_LIMITS,      // options.torque_rate, clearance_min, hold_rate or switch_gain
   ENGRAM_ERROR_WATCHDOG,    // options.state_gap_us, plan_age_us or off_after_us
+  ENGRAM_ERROR_DELAY,       // options.delay_us
   ENGRAM_ERROR_TABLES,      // the memory's tables do not belong to this robot and task: rebuild them
 } engram_error;
 
@@ -155,6 +158,7 @@ typedef struct engram_options {
   double clearance_min;     // m, a plan that comes nearer to an obstacle is not executed
   double switch_gain;       // 0 to 1: another guess replaces a good shifted plan when its merit is below (1 - gain) of it
   double hold_rate;         // 1 to 100, bandwidth of the hold controller (rad/s)
+  int64_t delay_us;         // us, 0 to 50000: known time from a state to the effect of the command that answers it
   int64_t state_gap_us;     // us, >= tick: longest time without a good state before the plan is dropped
   int64_t plan_age_us;      // us, >= tick: longest time without a new plan before the controller holds
   int64_t off_after_us;     // us, >= state_gap_us: longest time without a good state before the torque goes to zero
@@ -192,12 +196,20 @@ engram_status engram_prepare(engram_controller* handle, int64_t utime);
 engram_status engram_feedback(engram_controller* handle, int64_t utime, const double* q, const double* v);
 
 // Torque for the state q (nq), v (nv) measured at `utime`:
-//     tau = u*(t) - K(t) (x [-] x*(t)),  then clamped to the torque limits and to torque_rate.
+//     tau = u*(t) - K(t) (x [-] x*(t)),  t: when it acts (options.delay_us), x predicted so far,  then clamped to the torque limits and to torque_rate.
 // x*, u*, K: the plan, at its knot and moved along it to `utime`; K = - d tau / d x (nu x 2 nv), x [-] x* = (q [-] q*, v - v*).
 // On the lower rungs the law of that rung. `tau` (nu) in N m (or N) is always finite, whatever the state.
 engram_status engram_command(engram_controller* handle, int64_t utime, const double* q, const double* v, double* tau);
 
 // ---- what happened ----
+
+// Where feet and centre of mass of a robot on legs are asked to be, at the cycle's utime. World axes.
+typedef struct engram_legs {
+  int32_t nfeet;                          // used rows of foot; 0: no robot on legs
+  int32_t swing;                          // feet in the air, bit f for foot f
+  double foot[ENGRAM_FEET_MAX][4];        // where foot f stands, or where it shall land: x, y, z [m], heading [rad]
+  double com[3];                          // m, where the centre of mass shall be
+} engram_legs;
 
 // The last cycle that engram_feedback has ended.
 typedef struct engram_cycle {
@@ -219,6 +231,7 @@ typedef struct engram_cycle {
   double path[ENGRAM_KNOTS_MAX][3];       // m, planned hand position in the world, one row per knot
   double query_us, candidates_us, linearize_us, backward_us, rollout_us, total_us;  // by options.clock; 0 without one
   double asked_us[ENGRAM_CANDIDATE_COUNT];  // of query_us: what the memory's guesses of each kind took
+  engram_legs legs;
 } engram_cycle;
 void engram_cycle_info(const engram_controller* handle, engram_cycle* cycle);
 

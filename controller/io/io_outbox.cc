@@ -39,6 +39,12 @@ bool Outbox::cycle(const engram_cycle& c) {
   m.npath = c.npath;
   for (int k = 0; k < c.npath; ++k)
     for (int i = 0; i < 3; ++i) m.path[k][i] = static_cast<float>(c.path[k][i]);
+  static_assert(std::extent_v<decltype(engram_msg_cycle_t::foot)> == ENGRAM_FEET_MAX, "as many feet in cycle_t as in engram.h");
+  m.nfeet = c.legs.nfeet;
+  m.swing = c.legs.swing;
+  for (int f = 0; f < c.legs.nfeet; ++f)
+    for (int i = 0; i < 4; ++i) m.foot[f][i] = static_cast<float>(c.legs.foot[f][i]);
+  for (int i = 0; i < 3; ++i) m.com[i] = static_cast<float>(c.legs.com[i]);
   return send(kCycleChannel, bytes_, encode(bytes_, sizeof bytes_, m));
 }
 

@@ -47,6 +47,7 @@ void print_help(const Settings& s, const Models& models) {
       "  --iterations-jump N         FDDP iterations in the period after a jump, from each start (%d)\n"
       "  --starts N                  guesses with different final postures that are iterated after a jump (%d)\n"
       "  --budget US                 CPU time per period after which no iteration begins; 0: none (lockstep 0, wall %.0f)\n"
+      "  --delay US                  known time from a state to the effect of the command that answers it (0)\n"
       "  --timing FILE               write the CPU time of every cycle by phase, as CSV\n"
       "  --jumps FILE                write every jump's start, target, and merit after each iteration, as CSV\n"
       "  --realtime                  lock memory and ask for SCHED_FIFO\n"
@@ -90,6 +91,7 @@ bool read_settings(int argc, char** argv, const Models& models, Settings* s, int
     kIterationsJump,
     kStarts,
     kBudget,
+    kDelay,
     kTiming,
     kJumps,
     kRealtime,
@@ -104,6 +106,7 @@ bool read_settings(int argc, char** argv, const Models& models, Settings* s, int
                                     {"iterations-jump", required_argument, nullptr, kIterationsJump},
                                     {"starts", required_argument, nullptr, kStarts},
                                     {"budget", required_argument, nullptr, kBudget},
+                                    {"delay", required_argument, nullptr, kDelay},
                                     {"timing", required_argument, nullptr, kTiming},
                                     {"jumps", required_argument, nullptr, kJumps},
                                     {"realtime", no_argument, nullptr, kRealtime},
@@ -170,6 +173,12 @@ bool read_settings(int argc, char** argv, const Models& models, Settings* s, int
         if (!read_number(optarg, &s->options.budget_us)) return *exit_code = wrong("--budget %s: not a number", optarg), false;
         budget_given = true;
         break;
+      case kDelay: {
+        int32_t us = 0;
+        if (!read_count(optarg, &us)) return *exit_code = wrong("--delay %s: not a count of us", optarg), false;
+        s->options.delay_us = us;
+        break;
+      }
       case kVersion:
         return std::printf("engram-controller %s\n", engram_version()), *exit_code = 0, false;
       case kHelp:

@@ -39,6 +39,10 @@ template <class Task_> struct AnymalBody {
 
 // Trots at a commanded velocity, or stands.
 struct AnymalTrot : AnymalBody<tasks::AnymalTrot> {
+  struct Capture {
+    static constexpr double gain = Task::gait_capture, hold[2] = {0.01, 0.01}, reach = Task::gait_push_reach, rate = Task::gait_push_rate;
+    static constexpr double frozen = 0.0;
+  };
   struct Gait {
     static constexpr unsigned kLeftFore = 1u, kRightFore = 2u, kLeftHind = 4u, kRightHind = 8u;
     static constexpr int swing = static_cast<int>(Task::gait_swing), stance = static_cast<int>(Task::gait_stance);
@@ -46,6 +50,7 @@ struct AnymalTrot : AnymalBody<tasks::AnymalTrot> {
     static constexpr GaitPhase phase[nphases] = {
         {kLeftFore | kRightHind, swing}, {0u, stance}, {kRightFore | kLeftHind, swing}, {0u, stance}};
     static constexpr double slot = Task::dt, swing_height = Task::gait_height;
+    static void within_reach(int, const Placement (&)[nfeet], Placement&) {}
   };
   static void command(const double* task, LeggedCommand& c) {
     if (task[3] > 0.5) c.pace = {task[0], task[1], task[2], true};

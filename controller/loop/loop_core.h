@@ -165,7 +165,8 @@ template <class M, class Self> engram_status PlannerCore<M, Self>::feedback(int6
   if (status == ENGRAM_NOT_FINITE || trial_ == Trial::kPostponed) return finish(status, fallback, deadline);
   plan_ = solve_.plan;
   plan_jump_ = task_.jump;
-  fast_.slot() = plan_;
+  static_cast<Plan<P, N>&>(fast_.slot()) = plan_;
+  if (options_.delay_us > 0) solve_.copy_models(fast_.slot().D);
   fast_.publish();
   return finish(good ? status : ENGRAM_BAD_STATE, ENGRAM_RUNG_PLAN, deadline);
 }

@@ -1,6 +1,6 @@
 // The fast side of the loop: torque from the newest plan at every state, and the ladder below it.
 //
-//   plan      u = u* - K (x (-) x*)              x*, u*, K of the plan at time t
+//   plan      u = u* - K (x (-) x*)              x*, u*, K of the plan at time t; where commands act late, when they do (loop_delay.h)
 //   hold      keeps the posture at which holding began     (loop_hold.h: what that is depends on the kind of robot)
 //   damping   takes out the motion
 //   off       u = 0
@@ -10,6 +10,7 @@
 #define CONTROLLER_LOOP_LOOP_FAST_H_
 
 #include "controller/engram.h"
+#include "controller/loop/loop_delay.h"
 #include "controller/loop/loop_exchange.h"
 #include "controller/loop/loop_hold.h"
 #include "controller/loop/loop_plan.h"
@@ -68,7 +69,7 @@ template <class P, int N, class Hold> class FastLoop {
 
   // ---- planner thread ----
   // The slot of the next plan; n = 0 means hold.
-  Plan<P, N>& slot() { return exchange_.slot(); }
+  Order<P, N>& slot() { return exchange_.slot(); }
   void publish() { exchange_.publish(); }
   // The planner lives at time utime and stands at this rung and status.
   void alive(int64_t utime, engram_status status) {
@@ -87,12 +88,13 @@ template <class P, int N, class Hold> class FastLoop {
   void limit(int64_t utime, double* tau);
 
   const engram_options& options_;
-  Exchange<Plan<P, N>> exchange_;
+  Exchange<Order<P, N>> exchange_;
   std::atomic<int64_t> alive_{0};
   std::atomic<int32_t> status_{ENGRAM_NO_TASK};
   std::atomic<int32_t> worst_{ENGRAM_RUNG_PLAN};
 
   StateWatch<P> watch_;
+  DelayedCommands<P> sent_;
   bool commanded_ = false, holding_ = false, overspeed_ = false;
   int64_t utime_ = 0;  // us, of the last command
   Hold hold_;
@@ -100,13 +102,14 @@ template <class P, int N, class Hold> class FastLoop {
 };
 
 template <class P, int N, class Hold> bool FastLoop<P, N, Hold>::plan_law(int64_t utime, bool good, double* tau) const {
-  const Plan<P, N>& plan = exchange_.value();
-  const int k = plan.knot_at(utime);
+  const Order<P, N>& plan = exchange_.value();
+  const int k = plan.knot_at(utime + options_.delay_us);
   std::memcpy(tau, plan.s.u[k], sizeof(double) * nu);
   if (good) {
     double x[P::nx], dx[P::Layout::nxp];
     plan_state(plan, utime, x);
     P::difference(x, watch_.x, dx);
+    if (options_.delay_us > 0) sent_.predict(plan, utime, options_.delay_us, dx);
     for (int i = 0; i < nu; ++i)
       for (int j = 0; j < P::Layout::nxp; ++j) tau[i] -= plan.s.K[k][i][j] * dx[j];
   }
@@ -166,6 +169,7 @@ engram_status FastLoop<P, N, Hold>::command(int64_t utime, const double* q, cons
 
   if (rung > worst_.load(std::memory_order_relaxed)) worst_.store(rung, std::memory_order_relaxed);
   std::memcpy(tau_, tau, sizeof(tau_));
+  if (options_.delay_us > 0) sent_.sent(utime, tau);
   utime_ = utime;
   commanded_ = true;
   return status;

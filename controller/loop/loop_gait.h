@@ -3,7 +3,8 @@
 // Time is cut into slots (whole knots of the horizon). A gait G is data:
 //
 //   struct G { static constexpr int nfeet, nphases, lead; static constexpr GaitPhase phase[nphases];   round and round, begins with a swing
-//              static constexpr double swing_height; };
+//              static constexpr double slot, swing_height;   length of a slot [s]; [m]
+//              static void within_reach(int f, const Placement (&feet)[nfeet], Placement& at); };   foothold `at` of foot f, others standing
 //
 //   standing -> (asked to walk) lead: all feet, `lead` slots -> phase 0 -> 1 -> ... -> 0 ...
 //   (asked to stop) -> every foot swings once more, to under the body -> standing
@@ -102,6 +103,17 @@ template <class G> class Gait {
     }
   }
 
+  // The body's path moves by this [m], world axes: footholds have, and do not come back.
+  void move_path(const double (&shift)[2]) {
+    for (int i = 0; i < 2; ++i) body_.p[i] += shift[i];
+  }
+  // Slots from the one under way to the next touch-down.
+  int to_landing() const {
+    int i = 0;
+    while (i + 1 < n_ && phase_[i].swing == 0) ++i;
+    return static_cast<int>(phase_[i].first + phase_[i].slots - slot_);
+  }
+
   // A standing foot is really here. Headings grow beyond pi as the robot turns; a measured one does not.
   void measured(int f, const Placement& at) {
     const double yaw = nearest_turn(at.yaw, foot_[f].yaw);
@@ -126,7 +138,12 @@ template <class G> class Gait {
       p.swing = cursor.index >= 0 ? G::phase[cursor.index].swing : 0u;
       for (int f = 0; f < nfeet; ++f) {
         p.from[f] = p.to[f] = foot[f];
-        if (p.swing >> f & 1u) foot[f] = p.to[f] = foothold(f, first + p.slots, pace, push);
+        if (p.swing >> f & 1u) p.to[f] = foothold(f, first + p.slots, pace, push);
+      }
+      for (int f = 0; f < nfeet; ++f) {
+        if ((p.swing >> f & 1u) == 0) continue;
+        G::within_reach(f, p.from, p.to[f]);
+        foot[f] = p.to[f];
       }
       first += p.slots;
       cursor = after(cursor, pace.walk);

@@ -8,6 +8,7 @@
 //              static constexpr int legs;  driven dofs of the legs, which come first
 //              static constexpr int64_t kTickUs;  static constexpr int kIterations;  per tick
 //              static constexpr double kAcceleration;  at which a commanded pace is taken up [m/s^2, rad/s^2]
+//              struct Capture;   law of foot placement (loop_capture.h), and `frozen`: from so long before it lands a foothold stays [s]
 //              static void command(const double* task, LeggedCommand&);
 //              static void cone(Param&, double weight, double yaw), swing(Param&, double weight, const Placement&); };
 //
@@ -18,6 +19,7 @@
 #ifndef CONTROLLER_LOOP_LOOP_LEGGED_H_
 #define CONTROLLER_LOOP_LOOP_LEGGED_H_
 
+#include "controller/loop/loop_capture.h"
 #include "controller/loop/loop_gait.h"
 #include "controller/loop/loop_hold.h"
 #include "controller/loop/loop_lipm.h"
@@ -92,6 +94,8 @@ template <class C> class LeggedModel {
   void pose(const int64_t (&utime)[N + 1], const double* x0, Horizon<P, N>& h);
   void extend(const Horizon<P, N>& h, int k, const double* x, double* u, double* x_next) const;
 
+  void tell(engram_legs& legs) const;
+
   const Gait<typename C::Gait>& gait() const { return gait_; }
 
  private:
@@ -104,7 +108,7 @@ template <class C> class LeggedModel {
   double blend(int64_t utime) const;
   void look(const double* x);
   void follow();
-  void replan();
+  void replan(double part);
   void pendulum();
   // Feet that stand in a slot: the phase of its knot.
   unsigned gait_contacts(int64_t slot) const { return ((1u << nfeet) - 1u) & ~gait_.at(slot).swing; }
@@ -119,7 +123,8 @@ template <class C> class LeggedModel {
   int64_t origin_ = 0, taken_ = 0, before_taken_ = 0;  // us: slot 0; when they came
   double z_ = 0.0;               // height of the centre of mass at home above the feet [m]
   double com_[2] = {};           // reference at the slot under way [m]
-  double push_[2] = {};          // by which footholds move [m], world axes
+  double com_now_[3] = {};       // reference at the first knot [m]
+  CaptureStep<typename C::Capture> capture_;    // by which footholds move
   double reference_[2][kWindow]; // centre of mass from there on [m]
   double ground_ = 0.0;          // height of the feet [m]
   double q_[R::nq];              // measured or expected
@@ -175,10 +180,8 @@ template <class C> void LeggedModel<C>::begin(int64_t utime, const double* x) {
   const Mat3<double> R_WB = rotation_of(x + 3);
   body.yaw = std::atan2(R_WB(1, 0), R_WB(0, 0));
   gait_.begin(0, feet_, body);
-  for (int i = 0; i < 2; ++i) {
-    com_[i] = body.p[i];
-    push_[i] = 0.0;
-  }
+  for (int i = 0; i < 2; ++i) com_[i] = body.p[i];
+  capture_.clear();
   origin_ = taken_ = before_taken_ = utime;
   now_ = before_ = LeggedCommand{};
   pace_ = Pace{};
@@ -228,18 +231,18 @@ template <class C> void LeggedModel<C>::pendulum() {
   }
 }
 
-// Footholds, phases and centre of mass of the window. Footholds move with the error of the capture point, where the pendulum would come
-// to rest, as fast and as far as a foot can follow that swings already.
-template <class C> void LeggedModel<C>::replan() {
-  const double rest = std::sqrt(z_ / 9.81);  // s
-  const double step = Task::gait_push_rate * 1e-6 * kTickUs;
-  for (int i = 0; i < 2; ++i) {
-    const double c0 = reference_[i][0], v = (reference_[i][1] - c0) / kStep;
-    const double error = gait_.walking() ? seen_com_[i] - com_[i] + rest * (seen_velocity_[i] - v) : 0.0;
-    const double wanted = std::clamp(Task::gait_capture * error, -Task::gait_push_reach, Task::gait_push_reach);
-    push_[i] = std::clamp(wanted, push_[i] - step, push_[i] + step);
+// Footholds, phases and centre of mass of the window. part: share of the slot under way that is over.
+template <class C> void LeggedModel<C>::replan(double part) {
+  const double w = std::sqrt(9.81 / z_), left = kStep * (gait_.to_landing() - part);
+  if (gait_.walking() && left > C::Capture::frozen) {
+    double error[2];
+    for (int i = 0; i < 2; ++i) {
+      const double c0 = reference_[i][0], v = (reference_[i][1] - c0) / kStep;
+      error[i] = seen_com_[i] - (c0 + part * kStep * v) + (seen_velocity_[i] - v) / w;
+    }
+    capture_.update(error, gait_.body().yaw, std::exp(w * left), 1e-6 * kTickUs);
   }
-  gait_.plan(pace_, kWindow, push_);
+  gait_.plan(pace_, kWindow, capture_.shift());
   pendulum();
 }
 
@@ -317,23 +320,42 @@ template <class C> void LeggedModel<C>::knot(int64_t utime, int64_t slot, double
 template <class C> void LeggedModel<C>::pose(const int64_t (&utime)[N + 1], const double* x0, Horizon<P, N>& h) {
   std::memcpy(q_, x0, sizeof(q_));
   look(x0);
-  follow();
   const int64_t slot = (utime[0] - origin_) / kStepUs;
   while (gait_.slot() < slot) {
     for (int i = 0; i < 2; ++i) com_[i] = reference_[i][1];
+    const bool swings = gait_.at(gait_.slot()).swing != 0;
     gait_.advance(gait_.slot() + 1, pace_);
-    if (gait_.slot() < slot) replan();
+    if (swings && gait_.age() == 0) {  // landed
+      gait_.move_path(capture_.shift());
+      capture_.clear();
+    }
+    if (gait_.slot() < slot) replan(0.0);
   }
   if (gait_.walking())
     for (int f = 0; f < nfeet; ++f)
       if (gait_.stands(f) && gait_.age() == 1) gait_.measured(f, feet_[f]);
-  replan();
+  const double part = static_cast<double>((utime[0] - origin_) % kStepUs) / kStepUs;
+  if (!gait_.walking() || kStep * (gait_.to_landing() - part) > C::Capture::frozen) follow();
+  replan(part);
   for (int k = 0; k < N; ++k) h.phase[k] = gait_contacts(slot + k);
   torques(x0, h);
   for (int k = 0; k <= N; ++k) {
     const double dt = k < N ? 1e-6 * static_cast<double>(utime[k + 1] - utime[k]) : kStep;
     knot(utime[k], slot + k, dt, k == N, h.knot[k]);
   }
+  std::memcpy(com_now_, h.knot[0].com_ref, sizeof(com_now_));
+}
+
+template <class C> void LeggedModel<C>::tell(engram_legs& legs) const {
+  static_assert(nfeet <= ENGRAM_FEET_MAX, "bounds of engram.h");
+  const auto& phase = gait_.at(gait_.slot());
+  legs.nfeet = nfeet;
+  legs.swing = static_cast<int32_t>(phase.swing);
+  for (int f = 0; f < nfeet; ++f) {
+    std::memcpy(legs.foot[f], phase.to[f].p, sizeof(phase.to[f].p));
+    legs.foot[f][3] = phase.to[f].yaw;
+  }
+  std::memcpy(legs.com, com_now_, sizeof(com_now_));
 }
 
 template <class C>

@@ -14,6 +14,7 @@
 //                                                                     x0: the state expected at utime[0]
 //   void extend(const Horizon<P, N>&, int k, const double* x, double* u, double* x_next)   a guess of knot k from state x on
 //   static void path(const double* x, double p[3])                    the point of the robot that is reported along the plan [m]
+//   void tell(engram_legs&) const                                     where legs are asked to be; nothing for a robot without
 //
 // It need not have contacts, nor phases. A model whose M::Memory `kRemembers` has a rival to the shifted plan at every tick (loop_rival.h).
 #ifndef CONTROLLER_LOOP_LOOP_RECEDING_H_
@@ -112,6 +113,7 @@ template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
   knot_times<N>(utime, origin_, M::kStepUs, utime_);
   solve_.horizon.n = N;
   model_.pose(utime_, solve_.horizon.x0, solve_.horizon);
+  model_.tell(cycle_.legs);
   cycle_.query_us = deadline.now() - posing;
   cycle_.nguess = 1;
   const bool cold = fresh || (options_.memory == ENGRAM_MODE_COLD && jumped_);

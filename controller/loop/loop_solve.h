@@ -108,6 +108,11 @@ template <class M> class Solve {
     return accepted;
   }
 
+  // D = d v' / d z of the first knots, where the trajectory was linearized.
+  template <int n, int nz> void copy_models(Real (&D)[n][P::nv][nz]) const {
+    for (int k = 0; k < n; ++k) std::memcpy(D[k], work_.model[k].D, sizeof(D[k]));
+  }
+
   bool converged() const { return work_.feasible && stop_ < kStop; }
   double stop() const { return stop_; }  // expected improvement of the last direction
   double reg() const { return work_.reg; }

@@ -27,7 +27,10 @@ template <class Task_, int kd> struct TalosBody {
   static constexpr int legs = 12;  // driven dofs
   static constexpr int64_t kTickUs = 10000;
   static constexpr int kIterations = 1;  // per tick
-  static constexpr double kAcceleration = 1e3;  // of the pace [m/s^2, rad/s^2]: at once, as a step is chosen before it is made
+  static constexpr double kAcceleration = 1.0;  // of a pace, which only walking has
+  struct Capture {
+    static constexpr double gain = 0.0, hold[2] = {0.0, 0.0}, reach = 0.0, rate = 0.0, frozen = 0.0;
+  };
 
   template <class Param> static void cone(Param& p, double weight, double yaw) {
     p.wrench_w = weight;
@@ -50,6 +53,7 @@ struct TalosStand : TalosBody<tasks::TalosStand, 50> {
     static constexpr int nfeet = 2, nphases = 1, lead = 1;
     static constexpr GaitPhase phase[nphases] = {{0u, 1}};
     static constexpr double slot = Task::dt, swing_height = 0.0;
+    static void within_reach(int, const Placement (&)[nfeet], Placement&) {}
   };
   static void command(const double* task, LeggedCommand& c) {
     c.height = task[0];
@@ -60,12 +64,27 @@ struct TalosStand : TalosBody<tasks::TalosStand, 50> {
 
 // Walks at a commanded velocity, right foot first, or stands.
 struct TalosWalk : TalosBody<tasks::TalosWalk, 20> {
+  static constexpr double kAcceleration = Task::gait_acceleration;
+  struct Capture {
+    static constexpr double gain = Task::gait_capture, hold[2] = {Task::gait_hold[0], Task::gait_hold[1]};
+    static constexpr double reach = Task::gait_push_reach, rate = Task::gait_push_rate, frozen = Task::gait_frozen;
+  };
   struct Gait {
     static constexpr unsigned kLeft = 1u, kRight = 2u;
     static constexpr int swing = static_cast<int>(Task::gait_swing), stance = static_cast<int>(Task::gait_stance);
     static constexpr int nfeet = 2, nphases = 4, lead = static_cast<int>(Task::gait_lead);
     static constexpr GaitPhase phase[nphases] = {{kRight, swing}, {0u, stance}, {kLeft, swing}, {0u, stance}};
     static constexpr double slot = Task::dt, swing_height = Task::gait_height;
+    // Soles neither on nor across each other, legs no further apart than they bear.
+    static void within_reach(int f, const Placement (&feet)[nfeet], Placement& at) {
+      const Placement& stands = feet[1 - f];
+      const double c = std::cos(stands.yaw), s = std::sin(stands.yaw), dx = at.p[0] - stands.p[0], dy = at.p[1] - stands.p[1];
+      const double side = f == 0 ? 1.0 : -1.0;
+      const double x = std::clamp(c * dx + s * dy, -Task::gait_ahead, Task::gait_ahead);
+      const double y = std::clamp(side * (-s * dx + c * dy), Task::gait_aside[0], Task::gait_aside[1]) * side;
+      at.p[0] = stands.p[0] + c * x - s * y;
+      at.p[1] = stands.p[1] + s * x + c * y;
+    }
   };
   static void command(const double* task, LeggedCommand& c) {
     if (task[3] > 0.5) c.pace = {task[0], task[1], task[2], true};

@@ -36,6 +36,8 @@ template <class Self, class Task_, class P_, class Target_> class WayModel {
     return true;
   }
 
+  static void tell(engram_legs&) {}  // it has none
+
   void begin(int64_t, const double*) {}
   void take(int64_t, const Target& t) {
     target_ = t;

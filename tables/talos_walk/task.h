@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct TalosWalk {
   using Robot = robots::Talos;
   static constexpr char name[] = "talos_walk";
-  static constexpr uint64_t digest = 0xfa1476869eb57dbc;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0xbfc112b5557f08f0;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 4;
@@ -54,9 +54,14 @@ struct TalosWalk {
   static constexpr double gait_height = 0x1.eb851eb851eb8p-5;  // 0.06
   static constexpr double gait_swing_weight = 0x1.86ap+16;  // 100000
   static constexpr double gait_landing = 0x1.ep+4;  // 30
-  static constexpr double gait_capture = 0.0;  // 0
+  static constexpr double gait_acceleration = 0x1p-1;  // 0.5
+  static constexpr double gait_ahead = 0x1.999999999999ap-2;  // 0.4
+  static constexpr double gait_aside[2] = {0x1.1eb851eb851ecp-3, 0x1.999999999999ap-2};  // 0.14, 0.4
+  static constexpr double gait_capture = 0x1p+0;  // 1
+  static constexpr double gait_hold[2] = {0x1.eb851eb851eb8p-6, 0x1.47ae147ae147bp-6};  // 0.03, 0.02
   static constexpr double gait_push_rate = 0x1p+0;  // 1
-  static constexpr double gait_push_reach = 0x1.3333333333333p-3;  // 0.15
+  static constexpr double gait_push_reach = 0x1p-2;  // 0.25
+  static constexpr double gait_frozen = 0x1.47ae147ae147bp-4;  // 0.08
 
   // obstacles: centre, axes and half sizes [m]
   static constexpr int nbox = 0;

@@ -2,7 +2,9 @@
 // Talos in MuJoCo: walks at the commanded velocity, turns through the heading where angles jump, stops and stands.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "tests/support/legged_plant.h"
 
@@ -38,6 +40,33 @@ TEST(WalkTest, WalksTurnsThroughHalfATurnAndStops) {
   run(7500);
   EXPECT_LT(std::hypot(plant.com_velocity[0], plant.com_velocity[1], plant.com_velocity[2]), 0.02);  // m/s: stands
   EXPECT_EQ(c.cycle().rung, ENGRAM_RUNG_PLAN);
+}
+
+// Every command acts 10 ms late. Answered by what the state will be, the walk is as without; if nothing is told, torques saturate.
+TEST(WalkTest, CommandsThatActLateAreAnsweredByAPrediction) {
+  const auto least_up = [](int64_t told) {
+    LeggedPlant plant(kModel, 0.4);
+    plant.delay(10);
+    engram_options options;
+    engram_default_options(kModel, &options);
+    options.delay_us = told;
+    LeggedController c(kModel, &options);
+    const double stand[4] = {}, walk[4] = {0.3, 0.03, -0.2, 1.0};
+    double up = 1.0, torque = 0.0;
+    EXPECT_EQ(engram_set_task(c.handle, 0, 1, stand, 4), ENGRAM_CONVERGED);
+    for (int t = 0; t < 2500 && up > 0.7; ++t) {
+      if (t == 100) engram_set_task(c.handle, plant.utime, 2, walk, 4);
+      c.step(plant);
+      up = std::min(up, plant.base_up());
+      for (size_t i = 0; t > 100 && i < c.tau.size(); ++i)
+        torque = std::max(torque, std::fabs(c.tau[i]) / plant.model()->actuator_ctrlrange[2 * i + 1]);
+    }
+    return std::pair(up, torque);
+  };
+  const auto [up, torque] = least_up(10000);
+  EXPECT_GT(up, 0.99);
+  EXPECT_LT(torque, 0.9);
+  EXPECT_GE(least_up(0).second, 1.0);  // its torques saturate
 }
 
 }  // namespace

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from engram.inputs import InputError
-from engram.prove import anymal, talos
+from engram.prove import anymal, talos, walk
 from engram.prove.report import Report
 from engram.prove.trial import COLUMNS, Series, Trial, run_trial
 
@@ -40,6 +40,32 @@ def test_drift_error_and_velocity_of_known_motions() -> None:
     assert talos.squat_error(series(Trial("talos_stand", 6.0), 600, com=com)) < 1e-12
     com[:, :2] = 0.3 * time[:, None] * [0.0, 1.0]  # along +y, which is forward at 90 degrees
     assert anymal.velocity(series(Trial("anymal_trot", 6.0, 90.0), 600, com=com)) == pytest.approx([0.3, 0.0], abs=1e-12)
+
+
+def test_landings_tracking_and_falls_of_a_known_walk(capsys) -> None:
+    """The left foot swings twice; it lands 3 mm and 4 mm from where it was to."""
+    trial = Trial("talos_walk", 6.0)
+    swing, foot, foothold, com = np.zeros(600), np.zeros((600, 16)), np.zeros((600, 16)), np.zeros((600, 3))
+    for first, error in ((100, 3e-3), (200, 4e-3)):
+        swing[first : first + 50] = 1
+        foothold[first : first + 50, 0] = 1.0
+        foot[first + 50 : first + 70, 0] = 1.0 + error
+    com[:, 1] = 5e-3
+    run = series(trial, 600, swing=swing, foot=foot, foothold=foothold, com=com)
+    assert walk.landings(run) == pytest.approx([3e-3, 4e-3])
+    assert walk.com_error(run) == pytest.approx(5e-3)
+    assert not walk.falls(run)
+    fallen = series(trial, 400, up=np.linspace(1.0, 0.7, 400))
+    assert walk.falls(fallen)
+    assert walk.falls(series(trial, 600, com_velocity=np.full((600, 3), 0.1)))  # walks on
+    timed = np.full(600, 900.0)
+    report = Report("talos.walk")
+    walk.judge(report, walk.CASES[0], [series(trial, 600, swing=swing, foot=foot, foothold=foothold, total_us=timed), fallen])
+    figures = {name.removeprefix("prove.talos.walk.free."): value for name, value, _, _ in report.figures}
+    assert (figures["falls"], figures["steps"]) == (1, 2)
+    assert figures["landing.max"] == pytest.approx(4.0)
+    assert report.failed == 2  # one fell, and the other has made two steps
+    assert "1 of  2" in capsys.readouterr().out
 
 
 def test_a_push_too_strong_is_seen(build) -> None:

@@ -127,6 +127,8 @@ def test_help_and_version_tell(build: Path) -> None:
         (["--iterations", "many"], "not a count"),
         (["--iterations", "0"], "must be 1 to 50"),
         (["--budget", "-1"], "budget_us"),
+        (["--delay", "soon"], "not a count of us"),
+        (["--delay", "60000"], "delay_us must be 0 to 50000"),
         (["--nonsense"], "--nonsense"),
         (["state"], "unexpected argument: state"),
         (["--timing", "/nowhere/t.csv"], "cannot write /nowhere/t.csv"),

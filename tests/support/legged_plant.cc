@@ -41,7 +41,10 @@ LeggedPlant::~LeggedPlant() {
 }
 
 void LeggedPlant::step(const double* tau) {
-  std::memcpy(d_->ctrl, tau, sizeof(double) * static_cast<size_t>(m_->nu));
+  const auto nu = static_cast<size_t>(m_->nu);
+  under_way_.emplace_back(tau, tau + nu);
+  std::memcpy(d_->ctrl, under_way_.front().data(), sizeof(double) * nu);  // until the first one acts, it acts already
+  if (under_way_.size() > static_cast<size_t>(delay_)) under_way_.pop_front();
   mj_step(m_, d_);
   utime += kStepUs;
   measure();
@@ -50,6 +53,26 @@ void LeggedPlant::step(const double* tau) {
 void LeggedPlant::push(const char* body, const double (&force)[3]) {
   const int id = mj_name2id(m_, mjOBJ_BODY, body);
   for (int i = 0; i < 3; ++i) d_->xfrc_applied[6 * id + i] = force[i];
+}
+
+void LeggedPlant::add_mass(const char* body, double mass) {
+  m_->body_mass[mj_name2id(m_, mjOBJ_BODY, body)] += mass;
+  mjData* const scratch = mj_makeData(m_);
+  mj_setConst(m_, scratch);
+  mj_deleteData(scratch);
+}
+
+void LeggedPlant::friction(double mu) { m_->geom_friction[3 * mj_name2id(m_, mjOBJ_GEOM, "ground")] = mu; }
+
+// A sole that is lower on its foot meets level ground as early as the sole itself meets ground that is higher.
+void LeggedPlant::raise_ground(const char* sole, double height) {
+  const int g = mj_name2id(m_, mjOBJ_GEOM, sole);
+  double& raised = ground_[sole];
+  double up[3];
+  const double z[3] = {0.0, 0.0, 1.0};
+  mju_rotVecQuat(up, z, m_->geom_quat + 4 * g);
+  for (int i = 0; i < 3; ++i) m_->geom_pos[3 * g + i] -= (height - raised) * up[i];
+  raised = height;
 }
 
 // MuJoCo: quaternion w first, linear velocity in world axes. Ours: w last, body axes.

@@ -4,6 +4,9 @@
 
 #include <mujoco/mujoco.h>
 
+#include <deque>
+#include <map>
+#include <string>
 #include <vector>
 
 #include "controller/engram.h"
@@ -24,6 +27,12 @@ class LeggedPlant {
   void step(const double* tau);
   // Force [N], world axes, at the centre of mass of a body from now on.
   void push(const char* body, const double (&force)[3]);
+  // What the controller does not know of: a mass [kg] at the centre of mass of a body; friction of the ground; commands that act `delay`
+  // steps late; ground under the sole that is higher than elsewhere by so much [m], to be changed while the foot is in the air.
+  void add_mass(const char* body, double mass);
+  void friction(double mu);
+  void delay(int steps) { delay_ = steps; }
+  void raise_ground(const char* sole, double height);
 
   int64_t utime = 0;
   std::vector<double> q, v;  // measured
@@ -37,6 +46,9 @@ class LeggedPlant {
   void measure();
   mjModel* m_ = nullptr;
   mjData* d_ = nullptr;
+  int delay_ = 0;
+  std::deque<std::vector<double>> under_way_;  // commands that do not act yet
+  std::map<std::string, double> ground_;       // m, of each sole that is not on level ground
 };
 
 // A controller in memory of its own, and one millisecond of the closed loop.

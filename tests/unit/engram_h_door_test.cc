@@ -101,6 +101,7 @@ TEST(Door, RefusesWrongCallsWithAReason) {
   EXPECT_EQ(with([](auto& o) { o.clearance_min = NAN; }), ENGRAM_ERROR_LIMITS);
   EXPECT_EQ(with([](auto& o) { o.switch_gain = 2; }), ENGRAM_ERROR_LIMITS);
   EXPECT_EQ(with([](auto& o) { o.hold_rate = 0; }), ENGRAM_ERROR_LIMITS);
+  EXPECT_EQ(with([](auto& o) { o.delay_us = ENGRAM_DELAY_MAX_US + 1; }), ENGRAM_ERROR_DELAY);
   EXPECT_EQ(with([](auto& o) { o.state_gap_us = 1; }), ENGRAM_ERROR_WATCHDOG);
   EXPECT_EQ(with([](auto& o) { o.plan_age_us = 1; }), ENGRAM_ERROR_WATCHDOG);
   EXPECT_EQ(with([](auto& o) { o.off_after_us = o.state_gap_us - 1; }), ENGRAM_ERROR_WATCHDOG);

@@ -20,10 +20,14 @@ class Report:
 
     def add(self, what: str, value: float, unit: str, n: int, wanted: str = "", met: bool = True) -> None:
         """One figure `prove.<robot>.<what>`; `wanted` says what is asked for, `met` whether it holds."""
-        self.figures.append((f"prove.{self.robot}.{what}", float(value), unit, n))
-        self.failed += not met
+        self.quiet(what, value, unit, n, met)
         mark = "" if not wanted else f"   {'holds' if met else 'FAILS'}: {wanted}"
         print(f"  {what:28} {value:10.4g} {unit:5} n = {n}{mark}", flush=True)
+
+    def quiet(self, what: str, value: float, unit: str, n: int, met: bool = True) -> None:
+        """The same, without a line of its own."""
+        self.figures.append((f"prove.{self.robot}.{what}", float(value), unit, n))
+        self.failed += not met
 
     def add_times(self, runs: list[Series]) -> None:
         """CPU time per control period and phase, over all runs."""
@@ -39,7 +43,12 @@ class Report:
 
     def write(self) -> None:
         """build/figures/prove_<robot>.json."""
-        write_figures(f"prove_{self.robot}", self.figures)
+        write_figures(self.file, self.figures)
+
+    @property
+    def file(self) -> str:
+        """Name of the file of figures."""
+        return f"prove_{self.robot.replace('.', '_')}"
 
 
 def all_share(runs: list[Series]) -> float:

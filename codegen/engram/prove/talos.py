@@ -1,4 +1,4 @@
-"""Talos stands, squats, and takes pushes without a step; walks with turns and side steps, and stops."""
+"""Talos stands, squats, and takes pushes without a step."""
 
 import subprocess
 
@@ -22,22 +22,6 @@ def pushed(heading: float, way: tuple[float, float], impulse: float) -> Trial:
     """Stands, is pushed over 0.1 s, and is watched."""
     push = (PUSH_AT, (way[0] * impulse, way[1] * impulse))
     return Trial(MODEL, PUSH_AT + PUSH_TICKS, heading, (STAND,), (push,))
-
-
-def walk(draw: np.random.Generator, push: float = 0.0) -> Trial:
-    """Some 20 steps at three commands drawn at random, then a stop; a push (N s) at a random time and from a random side."""
-    lowest, highest = [-0.1, -0.06, -0.25], [0.4, 0.06, 0.25]  # m/s, m/s, rad/s
-    tasks = [(0.1, (0.0, 0.0, 0.0, 0.0))]
-    tasks += [(at, (*draw.uniform(lowest, highest), 1.0)) for at in (0.5, 5.5, 10.5)]
-    tasks.append((15.5, (0.0, 0.0, 0.0, 0.0)))
-    side, at = draw.uniform(0.0, 2.0 * np.pi), round(draw.uniform(3.0, 14.0), 3)
-    pushes = ((at, (push * np.cos(side), push * np.sin(side))),) if push else ()
-    return Trial("talos_walk", 19.0, draw.uniform(0.0, 360.0), tuple(tasks), pushes)
-
-
-def stopped(run: Series) -> bool:
-    """It walked to the end, and stands still now (2 cm/s)."""
-    return run.stands and np.linalg.norm(run["com_velocity"][-1]) < 0.02
 
 
 def drift(run: Series) -> float:
@@ -97,15 +81,6 @@ def prove(seed: int, quick: bool, cycles: int, jobs: int) -> Report:
             report.add(f"push.{name}", most, "N s", len(headings), f">= {wanted:.0f}", most >= wanted)
             report.add(f"push.{name}_limit", limit, "N s", 1)
     runs += [still, squat]
-    draw = np.random.default_rng([seed, 5])
-    n = 1 if quick else 10
-    walks = run_trials([walk(draw) for _ in range(n)], jobs, "walks")
-    share = np.mean([stopped(run) for run in walks])
-    report.add("walk.stands", share, "1", n, "20 steps with turns and side steps, then a stop", share == 1.0)
-    blows = [] if quick else run_trials([walk(draw, 10.0) for _ in range(n)], jobs, "walks under pushes")
-    if blows:
-        report.add("walk.push10.stands", np.mean([stopped(run) for run in blows]), "1", n)
-    runs += walks + blows
     report.add("torque_share", all_share(runs), "1", sum(len(run["time"]) for run in runs), "<= 1", all_share(runs) <= 1.0)
     runs += more_periods(cycles, runs, MODEL, squats, heading, jobs)
     report.add_times(runs)

@@ -14,24 +14,27 @@ from engram.paths import BUILD, ROOT
 PHASES = ["pose", "linearize", "backward", "rollout", "total"]
 VECTORS = ["com", "com_velocity"]
 SCALARS = ["up", "yaw", "slip", "torque", "status", "rung", "cost", *(f"{phase}_us" for phase in PHASES)]
-COLUMNS = [("time", 1), *((name, 3) for name in VECTORS), *((name, 1) for name in SCALARS)]
+COLUMNS = [("time", 1), *((name, 3) for name in VECTORS), *((name, 1) for name in SCALARS[:7])]
+COLUMNS += [("swing", 1), ("com_wanted", 3), ("foot", 16), ("foothold", 16), *((name, 1) for name in SCALARS[7:])]
 WIDTH = sum(n for _, n in COLUMNS)
 
 
 @dataclass(frozen=True)
 class Trial:
-    """What to run: a model, for so long, looking that way (deg), with tasks and pushes (s, values)."""
+    """What to run: a model, for so long, looking that way (deg), with tasks and pushes (s, values) and faults (name, value)."""
 
     model: str
     seconds: float
     heading: float = 0.0
     tasks: tuple[tuple[float, tuple[float, ...]], ...] = ()
     pushes: tuple[tuple[float, tuple[float, float]], ...] = ()  # N s forward and left, in the axes of the start
+    faults: tuple[tuple[str, float], ...] = ()  # what the controller is not told: load, friction, delay, uneven
 
     def arguments(self) -> list[str]:
         """Of engram-trial."""
         events = [("task", self.tasks), ("push", self.pushes)]
         words = [f"{key}={at}:{','.join(map(str, values))}" for key, items in events for at, values in items]
+        words += [f"{key}={value}" for key, value in self.faults]
         return [self.model, f"seconds={self.seconds}", f"heading={self.heading}", *words]
 
 
