@@ -10,7 +10,7 @@ import pytest
 from engram.cli import main
 from engram.engine import engine
 from engram.paths import BUILD
-from engram.study.trains import table_of
+from engram.study.trains import SOLVED, box_of, descended, table_of
 
 COSTS = {
     "panda.ik": lambda: engine.study_arm("panda.ik"),
@@ -48,6 +48,24 @@ def test_refinement_never_climbs_and_stays_in_the_box() -> None:
     assert np.all(c <= cost.evaluate(x)) and np.all(refined >= cost.lo) and np.all(refined <= cost.hi)
     np.testing.assert_array_equal(refined[:, : cost.ntask], x[:, : cost.ntask])
     np.testing.assert_allclose(cost.evaluate(refined), c, atol=1e-12)
+
+
+def test_starting_points_move_onto_a_fitted_grid() -> None:
+    cost = engine.study_arm("panda.reach")
+    rng = np.random.default_rng(4)
+    starts, c = cost.refine(rng.uniform(cost.lo, cost.hi, (200, cost.d)), 200)
+    starts = starts[c < SOLVED]  # only at a solution does rounding cost much
+    lo, hi = box_of(cost, starts)
+    assert np.all(lo >= cost.lo) and np.all(hi <= cost.hi) and np.prod((hi - lo) / (np.array(cost.hi) - cost.lo)) < 0.5
+    np.testing.assert_array_equal((lo[:3], hi[:3]), (cost.lo[:3], cost.hi[:3]))  # the task keeps its box
+    cost.lo, cost.hi = list(lo), list(hi)
+    points = np.array([20] * 3 + [48] * 7 + [10] * 14)
+    step = (hi - lo) / (points - 1)
+    x = descended(cost, starts, list(points), rng)
+    np.testing.assert_allclose((x - lo) / step, np.rint((x - lo) / step), atol=1e-9)
+    rounded = lo + np.clip(np.rint((starts - lo) / step), 0, points - 1) * step
+    np.testing.assert_array_equal(x[:, :3], rounded[:, :3])  # so does each point's task
+    assert np.all(cost.evaluate(x) <= cost.evaluate(rounded)) and np.median(cost.evaluate(x) / cost.evaluate(rounded)) < 0.8
 
 
 def test_cross_is_exact_where_the_rank_suffices() -> None:

@@ -13,6 +13,7 @@ from engram.learn.network import fit_density
 
 COMPONENTS = 40  # of the Bayesian mixture, at most
 EPOCHS = 100
+WIDEST = 512  # TAB_MLP_MAX_WIDTH of controller/tab/tab_mlp.h: a density of more outputs has no evaluator
 
 
 def learners(x: np.ndarray, ntask: int, answers: int) -> Iterator[tuple[str, Table]]:
@@ -22,6 +23,8 @@ def learners(x: np.ndarray, ntask: int, answers: int) -> Iterator[tuple[str, Tab
         inputs=[(f"x{k}", "m") for k in range(ntask)], lo=task.min(0), hi=task.max(0), held_out_error=0.0, held_out_text=""
     )
     yield "bgmr", mixture_table(condition(fit_bayesian(task, decided, COMPONENTS)), **domain)
+    if answers * (1 + 2 * decided.shape[1]) > WIDEST:
+        return
     net = fit_density(task, decided, modes=answers, epochs=EPOCHS)
     yield "mdn", Mlp(center=net.center, width=net.width, weights=net.weights, biases=net.biases, modes=net.modes, **domain)
 

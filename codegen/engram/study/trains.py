@@ -14,6 +14,8 @@ from engram.engine import engine
 
 SOLVED = 0.25  # cost at or below which a task counts as solved (thesis, caption of table 7.1)
 WORKERS = 2  # seeds that are built side by side
+OUTERMOST = 0.01  # share of the starting points, at either end, that a fitted grid leaves out
+MARGIN = 0.02  # what it adds, of the others' range
 JUDGED = (1, 10, 100)  # numbers of samples that a seed is judged by
 
 
@@ -23,6 +25,8 @@ class Recipe:
 
     points: tuple[int, int]
     rank: int
+    weights: tuple[int, int] = (0, 0)  # so many variables at the end are weights of motions: a coarser grid, so many points each
+    fitted: bool = False  # the grid spans the starting points alone, and these move downhill on it
     enrich: int = 8
     sweeps: int = 3
     tolerance: float = 1e-3
@@ -30,6 +34,7 @@ class Recipe:
     power: int = 2
     type: str = "int8"
     seeds: int = 6
+    alpha: float = 0.9  # priority of the samples that a seed is judged by
     starts: int = 600  # tasks from whose solutions the trains grow
     start_cost: float = SOLVED  # of a solution, at most
     uniform: int = 20  # uniform points per starting task, of which the best is refined
@@ -75,11 +80,45 @@ def lowest(cost: engine.StudyCost, x: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return x[np.arange(tasks), best], c[np.arange(tasks), best]
 
 
+def refined(cost: engine.StudyCost, x: np.ndarray, evaluations: int) -> tuple[np.ndarray, np.ndarray]:
+    """`cost.refine` of x (m, d) on all workers."""
+    parts = np.array_split(x, WORKERS)
+    with ThreadPoolExecutor(WORKERS) as pool:
+        ends, c = zip(*pool.map(lambda part: cost.refine(part, evaluations), parts), strict=True)
+    return np.concatenate(ends), np.concatenate(c)
+
+
 def solutions(cost: engine.StudyCost, tasks: np.ndarray, recipe: Recipe, rng: np.random.Generator) -> np.ndarray:
     """Solved points (m, d): the best of some uniform points of each task, refined; those above the start cost are left out."""
     start, _ = lowest(cost, uniform_points(cost, tasks, recipe.uniform, rng))
-    refined, c = cost.refine(start, recipe.start_evaluations or recipe.evaluations)
-    return refined[c <= recipe.start_cost]
+    x, c = refined(cost, start, recipe.start_evaluations or recipe.evaluations)
+    return x[c <= recipe.start_cost]
+
+
+def box_of(cost: engine.StudyCost, starts: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Where the decided variables of the starting points lie, but for the outermost of them; the task's box stays."""
+    lo, hi = np.array(cost.lo), np.array(cost.hi)
+    low, high = np.quantile(starts, [OUTERMOST, 1 - OUTERMOST], axis=0)
+    margin, decided = MARGIN * (high - low), np.arange(cost.d) >= cost.ntask
+    return np.where(decided, np.maximum(lo, low - margin), lo), np.where(decided, np.minimum(hi, high + margin), hi)
+
+
+def descended(cost: engine.StudyCost, starts: np.ndarray, points: list[int], rng: np.random.Generator) -> np.ndarray:
+    """The starting points on the grid over the cost's box: rounded, which costs them dearly, then twice every variable moved to a
+    neighbouring grid point if that is cheaper."""
+    lo, hi = np.array(cost.lo), np.array(cost.hi)
+    step = (hi - lo) / (np.array(points) - 1)
+    x = lo + np.clip(np.rint((starts - lo) / step), 0, np.array(points) - 1) * step
+    c = cost.evaluate(x)
+    for _ in range(2):
+        for k in cost.ntask + rng.permutation(cost.d - cost.ntask):
+            for side in (-step[k], step[k]):
+                tried = x.copy()
+                tried[:, k] = np.clip(x[:, k] + side, lo[k], hi[k])
+                c_tried = cost.evaluate(tried)
+                x = np.where((c_tried < c)[:, None], tried, x)
+                c = np.minimum(c, c_tried)
+    return x
 
 
 def samples(train: engine.TensorTrain, cost: engine.StudyCost, tasks: np.ndarray, alpha: float, count: int) -> np.ndarray:
@@ -97,31 +136,41 @@ def build(
     recipe: Recipe,
     draw: Callable[[np.random.Generator, int], np.ndarray],
     validation: np.ndarray,
-    alpha: float = 0.9,
 ) -> Built:
-    """The train of the seed from whose samples with priority alpha most validation tasks are solved, on average over `JUDGED`."""
+    """The train of the seed from whose samples most validation tasks are solved, on average over `JUDGED`."""
     cost.scale, cost.power = recipe.scale, recipe.power
     cpu, wall = time.process_time(), time.perf_counter()
-    points = [recipe.points[0]] * cost.ntask + [recipe.points[1]] * (cost.d - cost.ntask)
+    weights, coarser = recipe.weights
+    points = [recipe.points[0]] * cost.ntask + [recipe.points[1]] * (cost.d - cost.ntask - weights) + [coarser] * weights
     rng = np.random.default_rng(1)
     starts = solutions(cost, draw(rng, recipe.starts), recipe, rng)
-
+    box = cost.lo, cost.hi
+    if recipe.fitted:
+        lo, hi = box_of(cost, starts)
+        cost.lo, cost.hi = list(lo), list(hi)
+        starts = descended(cost, starts, points, rng)
     spread = cost.ntask if recipe.spread else 0
 
-    def one(seed: int) -> tuple[float, int, list[np.ndarray], Tt, engine.TensorTrain]:
+    def crossed(seed: int) -> tuple[list[np.ndarray], int, Tt]:
         cores, values = cost.cross(points, starts, recipe.rank, recipe.enrich, recipe.sweeps, recipe.tolerance, seed, spread)
-        table = table_of(cost, cores, recipe.type)
+        return cores, values, table_of(cost, cores, recipe.type)
+
+    def judged(table: Tt) -> tuple[float, engine.TensorTrain]:
         train = engine.TensorTrain(table, 1000)
-        drawn = samples(train, cost, validation, alpha, max(JUDGED))
+        drawn = samples(train, cost, validation, recipe.alpha, max(JUDGED))
         c = np.array([cost.refine(lowest(cost, drawn[:, :n])[0], recipe.evaluations)[1] for n in JUDGED])
         # among equals, the lower cost
-        return float(np.mean(c <= SOLVED)) - 1e-3 * float(np.mean(np.minimum(c, 1))), values, cores, table, train
+        return float(np.mean(c <= SOLVED)) - 1e-3 * float(np.mean(np.minimum(c, 1))), train
 
     with ThreadPoolExecutor(WORKERS) as pool:
-        built = list(pool.map(one, range(1, recipe.seeds + 1)))
+        made = list(pool.map(crossed, range(1, recipe.seeds + 1)))
+        cost.lo, cost.hi = box  # the refiner's
+        built = list(pool.map(judged, [table for _, _, table in made]))
     best = max(range(len(built)), key=lambda i: built[i][0])
-    _, _, cores, table, train = built[best]
+    cores, _, table = made[best]
     return Built(
-        train=train, table=table, cores=cores, seed=best + 1, validation=[b[0] for b in built], values=sum(b[1] for b in built),
-        cpu=time.process_time() - cpu, wall=time.perf_counter() - wall,
+        train=built[best][1], table=table, cores=cores, seed=best + 1, validation=[b[0] for b in built],
+        values=sum(m[1] for m in made),
+        cpu=time.process_time() - cpu,
+        wall=time.perf_counter() - wall,
     )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 
 from engram.engine import engine
 from engram.study.report import Report, wilson
-from engram.study.trains import SOLVED, Built, lowest, samples, solutions, uniform_points
+from engram.study.trains import SOLVED, Built, lowest, refined, samples, solutions, uniform_points
 
 COUNTS = (1, 10, 100, 1000)
 ALPHAS = {0.97: "a097", 0.9: "a09", 0.75: "a075", 0.5: "a05", 0.0: "a0"}  # priorities and their names in figures
@@ -29,7 +29,7 @@ class Row:
 
 def judged(cost: engine.StudyCost, start: np.ndarray, evaluations: int) -> Row:
     """Refines one start of each task."""
-    _, c = cost.refine(start, evaluations)
+    _, c = refined(cost, start, evaluations)
     return Row(float(cost.evaluate(start).mean()), float(c.mean()), float(np.mean(c <= SOLVED)))
 
 
@@ -49,15 +49,22 @@ def of_uniform(cost: engine.StudyCost, tasks: np.ndarray, count: int, evaluation
 
 
 class Neighbours:
-    """The plain control: stored solutions, in as many bytes as the train takes."""
+    """The plain control: stored solutions, in as many bytes as the train takes.
+
+    The first are refined from uniform points, the others from the cheapest of those.
+    """
 
     def __init__(self, cost: engine.StudyCost, draw, recipe, nbytes: int, seed: int):
         room = nbytes // (4 * cost.d)
-        rng, parts, found = np.random.default_rng(seed), [], 0
-        while found < room:  # at least one in four tasks is solved, so this ends
-            parts.append(solutions(cost, draw(rng, 500), recipe, rng))
-            found += len(parts[-1])
-        self.x = np.concatenate(parts)[:room].astype(np.float32).astype(float)
+        rng = np.random.default_rng(seed)
+        first = self.x = solutions(cost, draw(rng, 500), recipe, rng)
+        while len(self.x) < room:  # most tasks are solved, so this ends
+            tasks = draw(rng, 500)
+            start = np.repeat(first[None], len(tasks), axis=0)
+            start[:, :, : cost.ntask] = tasks[:, None]
+            x, c = refined(cost, lowest(cost, start)[0], recipe.start_evaluations or recipe.evaluations)
+            self.x = np.concatenate([self.x, x[c <= SOLVED]])
+        self.x = self.x[:room].astype(np.float32).astype(float)
         self.range = np.array(cost.hi[: cost.ntask]) - np.array(cost.lo[: cost.ntask])
 
     def starts(self, cost: engine.StudyCost, task: np.ndarray, count: int) -> np.ndarray:
@@ -76,11 +83,11 @@ class Neighbours:
 def modes(cost: engine.StudyCost, starts: np.ndarray, evaluations: int, joints: slice, apart: float = 0.35) -> float:
     """Distinct solutions per task among the refined starts (tasks, count, d): some joint differs by more than `apart` [rad]."""
     tasks, count, d = starts.shape
-    refined, c = cost.refine(starts.reshape(-1, d), evaluations)
-    refined, solved, total = refined.reshape(tasks, count, d), (c <= SOLVED).reshape(tasks, count), 0
+    x, c = refined(cost, starts.reshape(-1, d), evaluations)
+    x, solved, total = x.reshape(tasks, count, d), (c <= SOLVED).reshape(tasks, count), 0
     for i in range(tasks):
         kept: list[np.ndarray] = []
-        for q in refined[i, solved[i]][:, joints]:
+        for q in x[i, solved[i]][:, joints]:
             if all(np.abs(q - other).max() > apart for other in kept):
                 kept.append(q)
         total += len(kept)
