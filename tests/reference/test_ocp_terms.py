@@ -322,28 +322,75 @@ def test_zmp_is_where_the_ground_pushes(oracle):
         close(knot.Lzz, 2.0 * np.outer(J, J), DIFFERENCE)
 
 
-# ---- forward dynamics with contacts ----
-
-
-def test_pinocchios_constrained_dynamics(oracle):
-    """Accelerations and forces of Pinocchio's proximal constraint solver with the same Baumgarte gains."""
-    contacts, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+def pinocchios_contacts(phase: int):
+    """Its own constraint solver with the same Baumgarte gains: (x, u) -> acceleration, forces on the feet as (frame, 6) local axes."""
+    contacts, datas, keys = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData(), []
     kinds = pin.ContactType.CONTACT_6D, pin.ContactType.CONTACT_3D
-    for kind, key, place in zip(kinds, ("LF", "RH"), (PLACEMENT, pin.SE3(np.eye(3), POINT_REF))):
+    for bit, kind, key, place in zip((SOLE, POINT), kinds, ("LF", "RH"), (PLACEMENT, pin.SE3(np.eye(3), POINT_REF))):
+        if not phase & bit:
+            continue
         at = model.frames[frame[key]]
         contact = pin.RigidConstraintModel(kind, model, at.parentJoint, at.placement, 0, place, pin.LOCAL)
         gains = contact.m_baumgarte_parameters
         gains.Kp, gains.Kd = KP, KD
         contacts.append(contact)
         datas.append(contact.createData())
+        keys.append(key)
     data, settings = model.createData(), pin.ProximalSettings(1e-14, 1e-12, 100)
     pin.initConstraintDynamics(model, data, contacts, datas)
+
+    def solve(x: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, list[tuple[str, np.ndarray]]]:
+        a = pin.constraintDynamics(model, data, x[:nq], x[nq:], np.r_[np.zeros(6), u], contacts, datas, settings)
+        return a.copy(), [(key, d.contact_force.vector.copy()) for key, d in zip(keys, datas)]
+
+    return solve
+
+
+def zmp_of(x: np.ndarray, forces: list[tuple[str, np.ndarray]], height: float) -> tuple[np.ndarray, float]:
+    """Where on the plane z = height the horizontal moment of the contact forces vanishes, (2) m, and how much they lift, N."""
+    data, moment, total = model.createData(), np.zeros(3), np.zeros(3)
+    pin.framesForwardKinematics(model, data, x[:nq])
+    for key, local in forces:
+        at = data.oMf[frame[key]]
+        f, n = at.rotation @ local[:3], at.rotation @ local[3:]
+        moment += np.cross(at.translation - [0.0, 0.0, height], f) + n
+        total += f
+    return np.array([-moment[1], moment[0]]) / total[2], total[2]
+
+
+@pytest.mark.parametrize("phase", [SOLE, POINT, BOTH], ids=["sole", "point", "both"])
+def test_zmp_is_that_of_pinocchios_forces(oracle, phase):
+    """Cost, gradient and Gauss-Newton Hessian from forces that are not ours; slopes by differences of these."""
+    w, ref, height = np.split(ZMP["zmp"], [2, 4])
+    solve, tried = pinocchios_contacts(phase), 0
+    for seed in range(16):
+        x, u = random_state(seed)
+        zmp, lift = zmp_of(x, solve(x, u)[1], height[0])
+        if lift < 100.0:  # hardly stands: the point is far off, and differences with it
+            continue
+        tried += 1
+        e = zmp - ref
+        knot = oracle("aligned", ZMP, phase, x, u)
+        close(knot.cost, 0.5 * e @ (w * e))
+        sides = [[moved(x, u, i, h) for h in (STEP, -STEP)] for i in range(nz)]
+        points = [[zmp_of(y, solve(y, v)[1], height[0])[0] for y, v in pair] for pair in sides]
+        J = np.array([(high - low) / (2 * STEP) for high, low in points]).T
+        close(knot.Lz, J.T @ (w * e), DIFFERENCE)
+        close(knot.Lzz, J.T @ (w[:, None] * J), DIFFERENCE)
+    assert tried > 1
+
+
+# ---- forward dynamics with contacts ----
+
+
+def test_pinocchios_constrained_dynamics(oracle):
+    """Accelerations and forces of Pinocchio's proximal constraint solver with the same Baumgarte gains."""
+    solve = pinocchios_contacts(BOTH)
     for seed in range(4):
         x, u = random_state(seed)
-        knot = oracle("local", {}, BOTH, x, u)
-        theirs = pin.constraintDynamics(model, data, x[:nq], x[nq:], np.r_[np.zeros(6), u], contacts, datas, settings)
-        close(knot.next[nq:] - x[nq:], theirs)
-        close(knot.force, np.r_[datas[0].contact_force.vector, datas[1].contact_force.linear])
+        knot, (a, forces) = oracle("local", {}, BOTH, x, u), solve(x, u)
+        close(knot.next[nq:] - x[nq:], a)
+        close(knot.force, np.r_[forces[0][1], forces[1][1][:3]])
 
 
 def test_mujocos_smooth_terms_balance_our_forces(oracle, build, root):
