@@ -1,6 +1,6 @@
 // Constraints lo <= r(x_k) <= hi on chosen knots by augmented Lagrangian: FDDP inside, multipliers outside.
 //
-// A constraint is a term of the problem, ResidualTerm<F, Lagrangian>, whose parameters of a knot hold penalty w, bounds and multiplier
+// A constraint is a term of the problem, ResidualTerm<F, Lagrangian> or, of a contact's force, ConeLimit<FrictionConeTerm<c>>, whose parameters of a knot hold penalty w, bounds and multiplier
 // lambda. With Pi the projection on [lo, hi], a round solves the problem with the terms' costs 1/2 w |r + lambda/w - Pi(r + lambda/w)|^2
 // and then sets
 //   lambda <- w (s - Pi(s)),  s = r + lambda/w
@@ -36,11 +36,15 @@ struct LagrangianStats {
 // Calls f(i, parameters, residual) for every row that holds a constraint: penalty > 0.
 template <class P, int N, class F> void for_constraints(Horizon<P, N>& h, const FddpSolution<P, N>& s, F f) {
   const Real none[P::nu] = {};
-  for (int k = 0; k <= h.n; ++k)
-    P::visit_constraints(h.knot[k], s.x[k], k < h.n ? s.u[k] : none, [&](auto& p, const auto& r) {
-      for (int i = 0; i < int(sizeof(r) / sizeof(r[0])); ++i)
-        if (p.w[i] > 0.0) f(i, p, r[i]);
-    });
+  const auto rows = [&](auto& p, const auto& r) {
+    for (int i = 0; i < int(sizeof(r) / sizeof(r[0])); ++i)
+      if (p.w[i] > 0.0) f(i, p, r[i]);
+  };
+  for (int k = 0; k <= h.n; ++k) {
+    const Real* const u = k < h.n ? s.u[k] : none;
+    if constexpr (P::kPhases) P::visit_constraints(h.phase_of(k), h.knot[k], s.x[k], u, rows);
+    else P::visit_constraints(h.knot[k], s.x[k], u, rows);
+  }
 }
 
 // Multipliers of the trajectory in s; fills stats.violation and stats.measure.

@@ -20,8 +20,6 @@ namespace engram {
 
 inline constexpr unsigned kImpact = kImpactPhase;
 
-template <class Term, class = void> inline constexpr bool kIsForceTerm = false;
-template <class Term> inline constexpr bool kIsForceTerm<Term, std::void_t<decltype(Term::kContact)>> = true;
 template <class Term, class = void> inline constexpr bool kIsTermOfContacts = false;
 template <class Term> inline constexpr bool kIsTermOfContacts<Term, std::void_t<decltype(Term::kOfContacts)>> = true;
 
@@ -65,9 +63,27 @@ template <class C, class... Terms> struct ContactOcp {
     for (int i = 0; i < nv; ++i) dx[Layout::ov + i] = x1[nq + i] - x0[nq + i];
   }
 
-  // Calls f(parameters, residual) for each constraint of a knot.
-  template <class F> static void visit_constraints(Knot<Real>& knot, const Real* x, const Real* u, F f) {
+  // Calls f(parameters, residual) for each constraint of a knot: of its state, then of the forces of its contacts.
+  template <class F> static void visit_constraints(unsigned phase, Knot<Real>& knot, const Real* x, const Real* u, F f) {
     engram::visit_constraints<R, Knot<Real>, F, Terms...>(knot, x, u, f);
+    if constexpr (((kHasMultipliers<Terms> && kIsForceTerm<Terms>) || ...)) {
+      if (phase == kTerminalPhase) return;
+      const unsigned active = phase & ~kImpact;
+      RbdData<R, Real> d;
+      ContactData<C, Real> cd;
+      Real a[nv], lambda[nf];
+      dynamics(phase, knot, x, u, d, cd, a);
+      rbd_contact_forces_seen(active, cd, lambda);
+      const auto visit = [&](auto* term) {
+        using Term = std::remove_pointer_t<decltype(term)>;
+        if constexpr (kHasMultipliers<Term> && kIsForceTerm<Term>) {
+          Real r[Term::kFaces];
+          Term::residual(param_of<Term>(knot), lambda + kContactTree<C>.first[Term::kContact], r);
+          if (contact_active(active, Term::kContact)) f(param_of<Term>(knot), r);
+        }
+      };
+      (visit(static_cast<Terms*>(nullptr)), ...);
+    }
   }
 
   // Next state and cost of a knot.

@@ -5,6 +5,7 @@
 #ifndef CONTROLLER_OCP_OCP_CONTACT_FORCE_H_
 #define CONTROLLER_OCP_OCP_CONTACT_FORCE_H_
 
+#include "controller/ocp/ocp_activation.h"
 #include "controller/rbd/rbd_contact.h"
 
 namespace engram {
@@ -39,7 +40,7 @@ template <int rows, class Cone, class P, class S> inline S cone_expand(const P& 
 
 // Friction pyramid of a point or a surface: |f_x|, |f_y| <= mu f_z, f_z >= 0.
 template <int contact> struct FrictionConeTerm {
-  static constexpr int kContact = contact;
+  static constexpr int kContact = contact, kFaces = 5;
   static constexpr bool kNeedsGravity = false;
   template <class S> struct Param {
     S friction_w;   // weight [1/N^2]
@@ -64,7 +65,7 @@ template <int contact> struct FrictionConeTerm {
 // Wrench cone of a rectangular sole: friction pyramid, centre of pressure within the sole, bounds on the yaw torque.
 // Source: Caron, Pham, Nakamura, Stability of Surface Contacts for Humanoid Robots (ICRA 2015), equations 15-24.
 template <int contact> struct WrenchConeTerm {
-  static constexpr int kContact = contact;
+  static constexpr int kContact = contact, kFaces = 17;
   static constexpr bool kNeedsGravity = false;
   template <class S> struct Param {
     S wrench_w;        // weight [1/N^2, 1/(N m)^2]
@@ -108,7 +109,7 @@ template <int contact> struct WrenchConeTerm {
 
 // Centre of pressure within a rectangular sole: |n_x| <= Y f_z, |n_y| <= X f_z.
 template <int contact> struct CopTerm {
-  static constexpr int kContact = contact;
+  static constexpr int kContact = contact, kFaces = 4;
   static constexpr bool kNeedsGravity = false;
   template <class S> struct Param {
     S cop_w;        // weight [1/(N m)^2]
@@ -126,6 +127,49 @@ template <int contact> struct CopTerm {
         f(a);
       }
   }
+};
+
+// The cone of one of the terms above as constraints a . l <= hi by multipliers (fddp_lagrangian.h), one a face, instead of a barrier.
+// The weight of `cone` is not used. A knot whose contact is not active must have penalties of 0.
+template <class Cone> struct ConeLimit {
+  static constexpr int kContact = Cone::kContact, kFaces = Cone::kFaces;
+  static constexpr bool kNeedsGravity = false;
+  using A = Lagrangian<kFaces>;
+  template <class S> struct Param : A::template Param<S> {
+    typename Cone::template Param<S> cone;
+  };
+  template <class S> static void residual(const Param<S>& p, const S* l, S (&r)[kFaces]) {
+    int face = 0;
+    Cone::visit(p.cone, [&](const auto& a) {
+      r[face] = 0.0;
+      for (int i = 0; i < width(a); ++i) r[face] = madd(a[i], l[i], r[face]);
+      ++face;
+    });
+  }
+  template <class S> static S cost(const Param<S>& p, const S* l) {
+    S r[kFaces], w[kFaces];
+    residual(p, l, r);
+    A::activate(p, r, w);
+    return weighted_square(r, w);
+  }
+  template <class S> static S expand(const Param<S>& p, const S* l, S* g, S (&H)[6][6]) {
+    S r[kFaces], w[kFaces];
+    residual(p, l, r);
+    A::activate(p, r, w);
+    int face = 0;
+    Cone::visit(p.cone, [&](const auto& a) {
+      for (int i = 0; i < width(a); ++i) {
+        const S wa = w[face] * a[i];
+        g[i] = madd(wa, r[face], g[i]);
+        for (int j = 0; j < width(a); ++j) H[i][j] = madd(wa, a[j], H[i][j]);
+      }
+      ++face;
+    });
+    return weighted_square(r, w);
+  }
+
+ private:
+  template <class S, int n> static constexpr int width(const S (&)[n]) { return n; }
 };
 
 // 1/2 w |l - l*|^2 over the rows of the contact.

@@ -91,9 +91,13 @@ template <class F, template <int> class Activation = Weighted> struct ResidualTe
 template <class Term, class = void> inline constexpr bool kHasMultipliers = false;
 template <class Term> inline constexpr bool kHasMultipliers<Term, std::void_t<decltype(Term::A::kHasMultipliers)>> = true;
 
-// Calls f(parameters, residual) for each of the terms that holds a constraint, at a state.
+// True if a term is of the force of one contact (ocp_contact_force.h).
+template <class Term, class = void> inline constexpr bool kIsForceTerm = false;
+template <class Term> inline constexpr bool kIsForceTerm<Term, std::void_t<decltype(Term::kContact)>> = true;
+
+// Calls f(parameters, residual) for each of the terms that holds a constraint of the state, at a state.
 template <class R, class Knot, class F, class... Terms> void visit_constraints(Knot& knot, const Real* x, const Real* u, F f) {
-  if constexpr ((kHasMultipliers<Terms> || ...)) {
+  if constexpr (((kHasMultipliers<Terms> && !kIsForceTerm<Terms>) || ...)) {
     RbdData<R, Real> d;
     rbd_kinematics(x, d);
     rbd_velocity(x + R::nq, d);
@@ -102,7 +106,7 @@ template <class R, class Knot, class F, class... Terms> void visit_constraints(K
     const KnotView<R, Real> view{x, x + R::nq, u, d, nullptr, nullptr};
     const auto visit = [&](auto* term) {
       using Term = std::remove_pointer_t<decltype(term)>;
-      if constexpr (kHasMultipliers<Term>) {
+      if constexpr (kHasMultipliers<Term> && !kIsForceTerm<Term>) {
         Real r[Term::rows];
         Term::residual(param_of<Term>(knot), view, r);
         f(param_of<Term>(knot), r);

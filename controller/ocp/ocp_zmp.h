@@ -16,7 +16,7 @@ template <class C, template <int> class Activation = Weighted> struct ZmpTerm {
   static_assert(kContactAxes<C> == Axes::kLocalWorldAligned, "the zero-moment point is computed from forces in world axes");
   using R = typename C::Robot;
   using A = Activation<2>;
-  static_assert(!kHasMultipliers<ZmpTerm>, "multipliers are for residuals of the state");
+  static_assert(!kHasMultipliers<ZmpTerm>, "multipliers are for residuals of the state and cones");
   static constexpr bool kNeedsGravity = false, kOfContacts = true;
   static constexpr int kCoupledRows = 2, nf = kContactRows<C>;
   static constexpr Real kLeastForce = 1.0;  // N

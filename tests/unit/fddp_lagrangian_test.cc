@@ -1,6 +1,8 @@
-// Constraints by augmented Lagrangian on a mass that is pushed along a line, where the optimum is known.
+// Constraints by augmented Lagrangian on a mass that is pushed along a line, where the optimum is known; and on one that is pushed off a
+// foot that must not slip.
 #include "controller/fddp/fddp_lagrangian.h"
 #include "controller/ocp/ocp.h"
+#include "controller/ocp/ocp_contact.h"
 #include "controller/ocp/ocp_motion_residuals.h"
 #include "controller/ocp/ocp_regularization.h"
 
@@ -111,6 +113,116 @@ TEST(FddpLagrangian, WhatCannotHoldEndsAtTheLimit) {
   c->outer.rounds = 8;
   EXPECT_EQ(c->solve(), FddpStatus::kIterationLimit);
   EXPECT_NEAR(c->stats.violation, 0.5, 1e-12);
+}
+
+// A foot of 1 kg that can go anywhere (x, y, z), and on it a mass of 1 kg that is pushed along x.
+struct Skater {
+  static constexpr int nj = 4, nq = 4, nv = 4, nu = 1;
+  static constexpr JointKind kind[nj] = {kPrismatic, kPrismatic, kPrismatic, kPrismatic};
+  static constexpr int parent[nj] = {-1, 0, 1, 2}, iq[nj] = {0, 1, 2, 3}, iv[nj] = {0, 1, 2, 3}, nsub[nj] = {4, 3, 2, 1};
+  static constexpr double R_PJ[nj][9] = {{0, 0, 1, 1, 0, 0, 0, 1, 0}, {0, 0, 1, 1, 0, 0, 0, 1, 0}, {0, 0, 1, 1, 0, 0, 0, 1, 0}, {0, 0, 1, 1, 0, 0, 0, 1, 0}};
+  static constexpr double p_PJ[nj][3] = {}, mass[nj] = {0, 0, 1, 1}, com[nj][3] = {}, inertia[nj][6] = {};
+  static constexpr double armature[nv] = {}, gravity[3] = {0, 0, -9.81}, u_max[nu] = {1e8};
+  enum Frame { kFoot, nframe };
+  static constexpr int frame_joint[nframe] = {2};
+  static constexpr double R_JF[nframe][9] = {{1, 0, 0, 0, 1, 0, 0, 0, 1}}, p_JF[nframe][3] = {};
+};
+struct Foot {
+  using Robot = Skater;
+  static constexpr int n = 1, frame[n] = {Skater::kFoot};
+  static constexpr ContactKind kind[n] = {ContactKind::kPoint};
+  static constexpr double kp = 0.0, kd = 0.0;
+};
+using End = ResidualTerm<State<Skater>, Lagrangian>;
+using Barrier = FrictionConeTerm<0>;
+using Grip = ConeLimit<FrictionConeTerm<0>>;
+using Skating = ContactOcp<Foot, ControlTerm<Skater, false>, End, Barrier, Grip>;
+
+// The mass goes 1 m in 1 s from rest to rest; what pushes it off, friction of at most `most` bears.
+struct SkaterCase {
+  static constexpr double most = 4.5, mu = most / (2.0 * 9.81);  // N; the free optimum needs 5.7
+  Horizon<Skating, N> h = {};
+  FddpWork<Skating, N> w;
+  FddpSolution<Skating, N> s = {};
+  FddpStats inner;
+  LagrangianStats stats;
+  LagrangianOpts outer;
+  explicit SkaterCase(bool hard) {
+    outer.tolerance = 1e-8;
+    h.n = N;
+    for (int k = 0; k < N; ++k) {
+      h.knot[k].dt = kDt;
+      h.knot[k].control_w = kWeight;
+      h.phase[k] = 1u;
+      h.knot[k].friction_mu = mu;
+      h.knot[k].friction_w = hard ? 0.0 : 0.1;
+      auto& grip = param_of<Grip>(h.knot[k]);
+      grip.cone.friction_mu = mu;
+      for (int i = 0; i < Grip::kFaces; ++i) {
+        grip.w[i] = hard ? 0.1 : 0.0;
+        grip.lo[i] = -1e8;
+      }
+    }
+    auto& end = param_of<End>(h.knot[N]);
+    end.w[3] = end.w[7] = 1.0;
+    end.lo[3] = end.hi[3] = 1.0;
+  }
+  FddpStatus solve() { return fddp_lagrangian(h, outer, FddpOpts{}, w, s, inner, stats); }
+};
+
+// Friction is the push: minimize 1/2 kWeight |u|^2 subject to A u = b, |u| <= most. Its dual has two unknowns, u = clamp(A' y).
+TEST(FddpLagrangian, FrictionConesAreHardAndTheirMultipliersTheDuals) {
+  auto c = std::make_unique<SkaterCase>(true);
+  ASSERT_EQ(c->solve(), FddpStatus::kConverged);
+  EXPECT_LT(c->stats.violation, 1e-8);
+  Eigen::Matrix<double, 2, N> A;
+  for (int j = 0; j < N; ++j) A.col(j) << kDt * kDt * (N - j), kDt;
+  const Eigen::Vector2d b(1.0, 0.0);
+  const auto clamped = [&](const Eigen::Vector2d& y) -> Eigen::VectorXd {
+    return (A.transpose() * y).cwiseMin(SkaterCase::most).cwiseMax(-SkaterCase::most);
+  };
+  Eigen::Vector2d y = (A * A.transpose()).ldlt().solve(b);
+  for (int i = 0; i < 50; ++i) {  // Newton on A clamp(A' y) = b
+    Eigen::Matrix2d slope = 1e-12 * Eigen::Matrix2d::Identity();
+    for (int j = 0; j < N; ++j)
+      if (std::fabs(A.col(j).dot(y)) < SkaterCase::most) slope += A.col(j) * A.col(j).transpose();
+    y += slope.ldlt().solve(b - A * clamped(y));
+  }
+  const Eigen::VectorXd u = clamped(y);
+  ASSERT_LT((A * u - b).norm(), 1e-10);
+  int tight = 0;
+  for (int j = 0; j < N; ++j) {
+    EXPECT_NEAR(c->s.u[j][0], u[j], 1e-5);
+    const auto& grip = param_of<Grip>(c->h.knot[j]);
+    const double beyond = A.col(j).dot(y) - u[j];  // what the cone takes away
+    // faces +x, -x, +y, -y, -z; u pushes the foot along -x, which the ground answers along +x
+    EXPECT_NEAR(grip.lambda[0] - grip.lambda[1], kWeight * beyond, 1e-6);
+    EXPECT_GE(std::fmin(grip.lambda[0], grip.lambda[1]), 0.0);
+    for (int i = 2; i < Grip::kFaces; ++i) EXPECT_EQ(grip.lambda[i], 0.0);
+    tight += std::fabs(beyond) > 1e-6;
+  }
+  EXPECT_GT(tight, 2);
+  EXPECT_LT(tight, N - 2);
+}
+
+template <class Cone> int faces() {
+  int n = 0;
+  Cone::visit(typename Cone::template Param<double>{}, [&](const auto&) { ++n; });
+  return n;
+}
+TEST(FddpLagrangian, EveryFaceOfAConeHasItsMultiplier) {
+  EXPECT_EQ(faces<FrictionConeTerm<0>>(), FrictionConeTerm<0>::kFaces);
+  EXPECT_EQ(faces<WrenchConeTerm<0>>(), WrenchConeTerm<0>::kFaces);
+  EXPECT_EQ(faces<CopTerm<0>>(), CopTerm<0>::kFaces);
+}
+
+TEST(FddpLagrangian, ABarrierOfTheSameConeGivesWay) {
+  auto c = std::make_unique<SkaterCase>(false);
+  ASSERT_EQ(c->solve(), FddpStatus::kConverged);
+  double most = 0.0;
+  for (int j = 0; j < N; ++j) most = std::fmax(most, std::fabs(c->s.u[j][0]));
+  EXPECT_GT(most, SkaterCase::most + 0.01);
+  EXPECT_LT(most, 5.7);
 }
 
 }  // namespace
