@@ -10,7 +10,7 @@ import pytest
 from engram.inputs import InputError
 from engram.prove import anymal, talos, walk
 from engram.prove.report import Report
-from engram.prove.trial import COLUMNS, Series, Trial, run_trial
+from engram.prove.trial import COLUMNS, Series, Trial, more_periods, run_trial
 
 
 def series(trial: Trial, n: int, **columns: np.ndarray) -> Series:
@@ -79,6 +79,23 @@ def test_wrong_arguments_are_named(build) -> None:
         run_trial(Trial("talos_stand", 1.0, 0.0, ((0.1, (-2.0, 0.0, 0.0)),)))
     with pytest.raises(InputError, match="usage"):
         run_trial(Trial("talos_fly", 1.0))
+
+
+@pytest.mark.parametrize("errand", [talos.errand, anymal.errand])
+def test_periods_to_time_are_of_different_runs(errand) -> None:
+    draw, other = np.random.default_rng(3), np.random.default_rng(3)
+    trials = [errand(draw) for _ in range(20)]
+    assert len(set(trials)) == 20 and trials == [errand(other) for _ in range(20)]
+    assert all(len(trial.tasks) > 3 and max(at for at, _ in trial.tasks) < trial.seconds for trial in trials)
+    assert sum(len(trial.pushes) for trial in trials) > 20
+
+
+def test_no_more_runs_than_periods_are_missing(monkeypatch) -> None:
+    monkeypatch.setattr("engram.prove.trial.run_trials", lambda trials, jobs, title: trials)
+    draw = np.random.default_rng(3)
+    have = [series(Trial("anymal_trot", 3.0), 300)]
+    assert len(more_periods(12300, have, lambda: anymal.errand(draw), 1)) == 2
+    assert more_periods(300, have, lambda: anymal.errand(draw), 1) == []
 
 
 def test_a_report_says_what_misses(capsys, tmp_path, monkeypatch) -> None:

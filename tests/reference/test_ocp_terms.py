@@ -323,7 +323,7 @@ def test_zmp_is_where_the_ground_pushes(oracle):
 
 
 def pinocchios_contacts(phase: int):
-    """Its own constraint solver with the same Baumgarte gains: (x, u) -> acceleration, forces on the feet as (frame, 6) local axes."""
+    """Its own constraint solver with the same Baumgarte gains: (x, u) -> acceleration, [(foot, its force (6), local axes)]."""
     contacts, datas, keys = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData(), []
     kinds = pin.ContactType.CONTACT_6D, pin.ContactType.CONTACT_3D
     for bit, kind, key, place in zip((SOLE, POINT), kinds, ("LF", "RH"), (PLACEMENT, pin.SE3(np.eye(3), POINT_REF))):

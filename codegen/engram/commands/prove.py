@@ -16,7 +16,7 @@ EPILOG = """examples:
   engram prove talos --task walk --case free push10
   engram prove anymal --seed 7          60 s of standing and trotting, pushes at random phases
   engram prove talos --quick            a few seconds of each
-  engram prove talos --cycles 200000    the same, and the times of so many control periods
+  engram prove talos --cycles 200000    the same, and the times of so many control periods, each run another one
 """
 
 
@@ -30,7 +30,11 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     )
     parser.add_argument("--seed", type=int, default=1, help="of headings, phases and sides (default: 1)")
     parser.add_argument("--quick", action="store_true", help="a few seconds of each")
-    parser.add_argument("--cycles", type=int, help="control periods to time (default: 100000; --quick: those that ran)")
+    parser.add_argument(
+        "--cycles",
+        type=int,
+        help="control periods to time, in runs that are all different (default: 100000; --quick: those that ran)",
+    )
     parser.add_argument("--jobs", type=int, default=1, help="runs side by side; times are clean with 1 (default: 1)")
     return parser
 

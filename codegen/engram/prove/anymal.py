@@ -3,7 +3,7 @@
 import numpy as np
 
 from engram.prove.report import Report, all_share
-from engram.prove.trial import Series, Trial, more_periods, run_trials
+from engram.prove.trial import Series, Trial, blows, more_periods, run_trials
 
 MODEL = "anymal_trot"
 STAND = (0.1, (0.0, 0.0, 0.0, 0.0))  # first task
@@ -16,6 +16,13 @@ PUSH_WANTED, PUSH_AIM = 15.0, 25.0  # N s
 def trot(seconds: float, speed: float, heading: float, pushes: tuple = ()) -> Trial:
     """Stands, then trots forward."""
     return Trial(MODEL, seconds, heading, (STAND, (WALK_AT, (speed, 0.0, 0.0, 1.0))), pushes)
+
+
+def errand(draw: np.random.Generator) -> Trial:
+    """A minute of trotting: another command every five seconds, and a push of at most 15 N s at a random phase of the gait."""
+    lowest, highest = [0.0, -0.1, -0.3], [0.6, 0.1, 0.3]  # m/s, m/s, rad/s
+    commands = [(at, (*draw.uniform(lowest, highest), 1.0)) for at in np.arange(WALK_AT, 60.0, 5.0)]
+    return Trial(MODEL, 60.0, draw.uniform(0.0, 360.0), (STAND, *commands), blows(draw, 60.0, 5.0, PUSH_WANTED))
 
 
 def velocity(run: Series) -> np.ndarray:
@@ -60,6 +67,8 @@ def prove(seed: int, quick: bool, cycles: int, jobs: int) -> Report:
             report.add(f"{name}.stands", share, "1", n)
         runs += pushed
     report.add("torque_share", all_share(runs), "1", sum(len(run["time"]) for run in runs), "<= 1", all_share(runs) <= 1.0)
-    runs += more_periods(cycles, runs, MODEL, (STAND[0], (0.3, 0.0, 0.0, 1.0)), 0.0, jobs)
+    varied = more_periods(cycles, runs, lambda: errand(draw), jobs)
+    report.add_varied(varied)
+    runs += varied
     report.add_times(runs)
     return report

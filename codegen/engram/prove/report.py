@@ -29,6 +29,11 @@ class Report:
         self.figures.append((f"prove.{self.robot}.{what}", float(value), unit, n))
         self.failed += not met
 
+    def add_varied(self, runs: list[Series]) -> None:
+        """How many of the runs that were only drawn for their control periods stood to the end."""
+        if runs:
+            self.add("varied.stands", np.mean([run.stands for run in runs]), "1", len(runs))
+
     def add_times(self, runs: list[Series]) -> None:
         """CPU time per control period and phase, over all runs."""
         times = cycle_times(runs)

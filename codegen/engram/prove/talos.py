@@ -7,7 +7,7 @@ from tqdm import tqdm
 
 from engram.paths import BUILD
 from engram.prove.report import Report, all_share
-from engram.prove.trial import Series, Trial, more_periods, run_trial, run_trials
+from engram.prove.trial import Series, Trial, blows, more_periods, run_trial, run_trials
 
 MODEL = "talos_stand"
 STAND, SETTLED = (0.1, (0.0, 0.0, 0.0)), 2.0  # first task; s after which it has settled
@@ -22,6 +22,13 @@ def pushed(heading: float, way: tuple[float, float], impulse: float) -> Trial:
     """Stands, is pushed over 0.1 s, and is watched."""
     push = (PUSH_AT, (way[0] * impulse, way[1] * impulse))
     return Trial(MODEL, PUSH_AT + PUSH_TICKS, heading, (STAND,), (push,))
+
+
+def errand(draw: np.random.Generator) -> Trial:
+    """A minute of squats: another height, depth and rate every six seconds, and pushes of at most 10 N s from random sides."""
+    lowest, highest = [-0.05, 0.0, 0.1], [0.0, DEPTH, RATE]  # m, m, Hz
+    squats = [(at, tuple(draw.uniform(lowest, highest))) for at in np.arange(0.1, 60.0, 6.0)]
+    return Trial(MODEL, 60.0, draw.uniform(0.0, 360.0), tuple(squats), blows(draw, 60.0, 6.0, 10.0))
 
 
 def drift(run: Series) -> float:
@@ -82,6 +89,9 @@ def prove(seed: int, quick: bool, cycles: int, jobs: int) -> Report:
             report.add(f"push.{name}_limit", limit, "N s", 1)
     runs += [still, squat]
     report.add("torque_share", all_share(runs), "1", sum(len(run["time"]) for run in runs), "<= 1", all_share(runs) <= 1.0)
-    runs += more_periods(cycles, runs, MODEL, squats, heading, jobs)
+    draw = np.random.default_rng([seed, 5])
+    varied = more_periods(cycles, runs, lambda: errand(draw), jobs)
+    report.add_varied(varied)
+    runs += varied
     report.add_times(runs)
     return report

@@ -1,6 +1,7 @@
 """One closed loop: runs build/bin/engram-trial and reads its time series."""
 
 import subprocess
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 
@@ -90,12 +91,20 @@ def run_trials(trials: list[Trial], jobs: int, title: str) -> list[Series]:
         return found
 
 
-def more_periods(cycles: int, have: list[Series], model: str, task: tuple, heading: float, jobs: int) -> list[Series]:
-    """Runs of a minute at one task, until all runs together have so many control periods (10 ms each)."""
-    left = cycles - sum(len(run["time"]) for run in have)
-    n = max(0, -(-left // 6000))
-    trial = Trial(model, 60.0, heading, (task,))
-    return run_trials([trial] * n, jobs, "periods to time") if n else []
+def more_periods(cycles: int, have: list[Series], draw: Callable[[], Trial], jobs: int) -> list[Series]:
+    """Runs that `draw` makes up, each another one, until all runs together have so many control periods (10 ms each)."""
+    left, trials = cycles - sum(len(run["time"]) for run in have), []
+    while left > 0:
+        trials.append(draw())
+        left -= round(100 * trials[-1].seconds)
+    return run_trials(trials, jobs, "periods to time") if trials else []
+
+
+def blows(draw: np.random.Generator, seconds: float, every: float, most: float) -> tuple:
+    """Pushes of Trial from random sides, of at most `most` N s, at a random time of each `every` s after the first."""
+    times = [start + round(draw.uniform(0.0, 0.5 * every), 3) for start in np.arange(every, seconds - 0.5 * every, every)]
+    sizes, sides = draw.uniform(0.0, most, len(times)), draw.uniform(0.0, 2.0 * np.pi, len(times))
+    return tuple((at, (size * np.cos(side), size * np.sin(side))) for at, size, side in zip(times, sizes, sides))
 
 
 def cycle_times(runs: list[Series]) -> dict[str, np.ndarray]:
