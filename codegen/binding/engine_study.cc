@@ -83,6 +83,16 @@ std::unique_ptr<StudyCost> mixture(const In<1>& weight, const In<1>& sharpness, 
                   std::vector<double>(d, -2.0), std::vector<double>(d, 2.0), 0, 1, plain);
 }
 
+Out by_ik(const std::string& robot, const In<2>& x, int iterations) {
+  const bool panda = robot == "panda";
+  if (!panda && robot != "ur10") throw nb::value_error("no such robot: panda, ur10");
+  check_shape<2>("x", x, {-1, panda ? 10 : 9});
+  NewArray out({x.shape(0), x.shape(1)});
+  std::copy_n(x.data(), x.size(), out.data());
+  (panda ? offline::panda_ik : offline::ur10_ik)(out.data(), x.shape(0), iterations);
+  return out.release();
+}
+
 nb::tuple gradient(const StudyCost& cost, const In<2>& x) {
   check_shape<2>("x", x, {-1, cost.d()});
   NewArray c({x.shape(0)}), g({x.shape(0), x.shape(1)});
@@ -212,6 +222,8 @@ void bind_study(nb::module_& engine) {
            "Cores of a tensor train of the density on a grid of `points`, grown from `starts` (m, d); and how many values it took.");
   engine.def("study_arm", &arm, "name"_a, "from_"_a = std::vector<double>{}, "to"_a = std::vector<double>{},
              "Cost on a compiled robot: 'panda.ik', ...; the ends of a 'transfer'.");
+  engine.def("study_ik", &by_ik, "robot"_a, "x"_a, "iterations"_a = 24,
+             "Points x (m, 3 + nq) of 'panda.ik' or 'ur10.ik' with the postures that controller/ik makes of theirs; it sees no obstacle.");
   engine.def("study_path", &path, "robot"_a, "q0"_a, "q1"_a, "w"_a, "Points (m, nq) of the motion primitive from q0 to q1.");
   engine.def("study_function", &benchmark, "name"_a, "d"_a = 2, "A benchmark function.");
   engine.def("study_mixture", &mixture, "weight"_a, "sharpness"_a, "mean"_a, "plain"_a = false,

@@ -21,6 +21,10 @@ std::unique_ptr<StudyCost> panda_cost(const std::string& what, const Ends& ends)
 std::unique_ptr<StudyCost> ur10_cost(const std::string& what);                      // free space, tool upright: ik
 std::unique_ptr<StudyCost> planar_cost(const std::string& robot, const std::string& what, const Ends& ends);  // among discs: ik, reach, transfer
 
+// controller/ik on the postures of m points x (m, 3 + nq) of the arm's "ik" cost, in place: to the target, blind to obstacles.
+void panda_ik(double* x, std::size_t m, int iterations);
+void ur10_ik(double* x, std::size_t m, int iterations);
+
 template <class M> std::unique_ptr<StudyCost> transfer_cost(const Ends& ends) {
   using F = TransferCost<M>;
   F f{};

@@ -1,6 +1,7 @@
 // The Panda among table, box and shelf: costs of thesis tables 7.1 to 7.3.
 #include "codegen/offline/study_arm.h"
 #include "codegen/offline/study_costs.h"
+#include "codegen/offline/study_ik.h"
 #include "codegen/offline/study_pose.h"
 #include "controller/ocp/ocp_obstacles.h"
 #include "tables/panda_reach/task.h"
@@ -14,6 +15,7 @@ struct PandaSetup {
   static constexpr int frame = Robot::kHandTcp;
   static constexpr int space = 3;
   static constexpr double clearance = 0.02;
+  static Mat3<Pack> pose(const Mat3<Pack>& R_WF) { return level(R_WF); }
   // the hand lies level: its x axis, normal to approach and finger travel, is vertical
   template <class S> static S orientation(const Mat3<S>& R_WF, Vec3<S>& moment) { return vertical_axis<S>(R_WF.column(0), moment); }
 };
@@ -49,6 +51,8 @@ std::unique_ptr<StudyCost> pose() {
 }
 
 }  // namespace
+
+void panda_ik(double* x, std::size_t m, int iterations) { refine_by_ik<PandaSetup>(x, m, iterations); }
 
 std::unique_ptr<StudyCost> panda_cost(const std::string& what, const Ends& ends) {
   if (what == "transfer") return transfer_cost<PandaSetup>(ends);

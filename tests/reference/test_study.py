@@ -107,3 +107,27 @@ def test_short_forms(row: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert values[0] >= 0.9, figures
     if row == "6.3":
         assert values[1] < 0.7  # the world is as hard as it was
+
+
+def test_inverse_kinematics_takes_postures_to_their_targets() -> None:
+    """Of the UR10 to the axes of the world, as its cost judges; of the Panda, blind to the shelf, to the nearest level hand.
+    Starts are solutions, moved by 0.2 rad a joint."""
+    rng = np.random.default_rng(5)
+    for robot in ("ur10", "panda"):
+        cost = engine.study_arm(f"{robot}.ik")
+        x, c = cost.refine(rng.uniform(cost.lo, cost.hi, (400, cost.d)), 400)
+        x = x[c < 1e-2]
+        x[:, 3:] = np.clip(x[:, 3:] + rng.uniform(-0.2, 0.2, x[:, 3:].shape), cost.lo[3:], cost.hi[3:])
+        found = engine.study_ik(robot, x)
+        np.testing.assert_array_equal(found[:, :3], x[:, :3])
+        if robot == "ur10":
+            assert np.mean(cost.evaluate(found) < 1e-6) > 0.9
+            continue
+        R, p = engine.panda.frame_placement(found[:, 3:], "hand_tcp")
+        there = np.linalg.norm(p - found[:, :3], axis=1) < 1e-6
+        assert there.mean() > 0.9
+        np.testing.assert_allclose(np.abs(R[there][:, 2, 0]), 1.0, atol=1e-9)
+        start = engine.panda.frame_placement(x[:, 3:], "hand_tcp")[0]
+        assert np.all(R[there][:, 2, 0] * start[there][:, 2, 0] > 0)  # up stays up
+    with pytest.raises(ValueError, match="panda, ur10"):
+        engine.study_ik("talos", x)

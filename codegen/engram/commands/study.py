@@ -46,14 +46,19 @@ def run(args: argparse.Namespace) -> int:
     """Run the rows in order."""
     import importlib
 
+    from threadpoolctl import threadpool_limits
+
     from engram.inputs import InputError, closest
 
-    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):  # of processes that a study starts
         os.environ.setdefault(name, "1")
     rows = [row for asked in args.rows for row in (matching(asked) or [asked])]
     for row in rows:
         if row not in ROWS:
             raise InputError(f"no study '{row}'; {closest(row, list(ROWS))}")
-    for row in rows:
-        importlib.import_module(f"engram.study.{ROWS[row]}").run(row, args.quick)
+    with threadpool_limits(
+        1
+    ):  # numpy is loaded: its matrix products would start threads of their own, for matrices this small in vain
+        for row in rows:
+            importlib.import_module(f"engram.study.{ROWS[row]}").run(row, args.quick)
     return 0

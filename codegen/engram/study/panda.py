@@ -10,8 +10,9 @@ from engram.engine import engine
 from engram.learn.contenders import table_bytes
 from engram.paths import MODELS
 from engram.study.learned_modes import learners, offers
+from engram.study.refiners import bfgs, clocked, ik
 from engram.study.report import Report
-from engram.study.trains import WORKERS, Recipe, build, samples
+from engram.study.trains import SOLVED, WORKERS, Recipe, build, lowest, samples, uniform_points
 from engram.study.warmstart import ALPHAS, COUNTS, Neighbours, compare, modes
 from engram.tasks.world import read_boxes
 
@@ -93,6 +94,8 @@ def run(row: str, quick: bool) -> None:
 
     neighbours = Neighbours(cost, draw, recipe, built.train.bytes, seed=3003)
     compare(report, cost, built, neighbours, validation, test, recipe.evaluations, THESIS[row], counts)
+    if row == "6.3":
+        compare_refiners(report, cost, built, test, recipe.evaluations, counts)
     looked_at = test[: 10 if quick else study.looked_at]
     count_modes(report, cost, built, neighbours, looked_at, recipe.evaluations, study.joints)
     count_learned_modes(report, cost, neighbours, looked_at, recipe.evaluations, study.joints)
@@ -110,6 +113,25 @@ def count_modes(report, cost, built, neighbours, tasks, evaluations: int, joints
     found = modes(cost, np.stack([neighbours.starts(cost, task, 20) for task in tasks]), evaluations, joints)
     report.figure("modes.knn", found, n=len(tasks))
     report.say("distinct solutions among 20 refined: " + ", ".join(parts) + f", 20 neighbours: {found:.1f}")
+
+
+def compare_refiners(report, cost, built, tasks, evaluations: int, counts: tuple[int, ...]) -> None:
+    """Success of both refiners from the same starts: the best of some samples, of some uniform points."""
+    rng = np.random.default_rng(8)
+    refiners = {"bfgs": bfgs(cost, evaluations), "ik": ik("panda", cost)}
+    for n in counts[:-1]:
+        starts = {
+            "train": lowest(cost, samples(built.train, cost, tasks, 0.9, n))[0],
+            "uniform": lowest(cost, uniform_points(cost, tasks, n, rng))[0],
+        }
+        parts = []
+        for name, x in starts.items():
+            for refiner, refine in refiners.items():
+                _, c, us = clocked(refine, x)
+                share = float(np.mean(c <= SOLVED))
+                report.figure(f"refiner.{refiner}.{name}.n{n}", share, n=len(tasks))
+                parts.append(f"{name}, {refiner} {100 * share:.1f} % ({us:.0f} us)")
+        report.say(f"refiners, best of {n}, alpha 0.9: " + "; ".join(parts))
 
 
 def count_learned_modes(report, cost, neighbours, tasks, evaluations: int, joints: slice) -> None:
