@@ -22,12 +22,11 @@ class StepMemory {
   static constexpr int N = Task::nknots, nx = R::nq + R::nv, nu = R::nu;
 
  public:
-  StepMemory(const nb::object& left, const nb::object& right, const nb::object& path, const nb::object& torque)
-      : left_(left, R::digest, Task::digest),
-        right_(right, R::digest, Task::digest),
+  StepMemory(const nb::object& regression, const nb::object& path, const nb::object& torque)
+      : regression_(regression, R::digest, Task::digest),
         path_(path, R::digest, Task::digest),
         torque_(torque, R::digest, Task::digest),
-        tables_{{left_.as<TabGpr>(), right_.as<TabGpr>()}, path_.as<TabPca>(), torque_.as<TabPca>()},
+        tables_{regression_.as<TabGpr>(), path_.as<TabPca>(), torque_.as<TabPca>()},
         work_(std::make_unique<StepWork<Task>>()),
         guess_(std::make_unique<StepGuess<Task>>()) {
     char text[TAB_TEXT];
@@ -38,16 +37,28 @@ class StepMemory {
                  const std::optional<In<1>>& next, int at) {
     const StepTask task = task_of(feet, goal, foot, previous, next);
     ask(task, at < 0 ? step_first<Task>(task) : at, x0);
-    const std::size_t n = guess_->last - guess_->first;
-    NewArray xs({n + 1, nx}), us({n, nu});
-    std::copy_n(guess_->x[guess_->first], (n + 1) * nx, xs.data());
-    std::copy_n(guess_->u[guess_->first], n * nu, us.data());
-    nb::dict result;
-    result["xs"] = xs.release();
-    result["us"] = us.release();
+    nb::dict result = guess();
     result["status"] = tab_status_text(guess_->status);
-    result["deviation"] = guess_->deviation;
     return result;
+  }
+
+  // The guess of coefficients z that another learner has found.
+  nb::dict decode(const In<1>& z, const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0, const std::optional<In<1>>& previous,
+                  const std::optional<In<1>>& next) {
+    check_shape<1>("z", z, {tables_.regression->m});
+    check_shape<1>("x0", x0, {nx});
+    const StepTask task = task_of(feet, goal, foot, previous, next);
+    std::copy_n(z.data(), z.shape(0), work_->z);
+    step_decode<Task, TalosMirror>(tables_, task, step_first<Task>(task), x0.data(), *work_, *guess_);
+    return guess();
+  }
+
+  static Out features(const In<2>& feet, const In<1>& goal, int foot, const std::optional<In<1>>& previous, const std::optional<In<1>>& next) {
+    double x[kStepFeatures];
+    step_features(task_of(feet, goal, foot, previous, next), x);
+    NewArray out({kStepFeatures});
+    std::copy_n(x, kStepFeatures, out.data());
+    return out.release();
   }
 
   // Processor time [us] of each of n queries.
@@ -63,6 +74,17 @@ class StepMemory {
   }
 
  private:
+  nb::dict guess() {
+    const std::size_t n = guess_->last - guess_->first;
+    NewArray xs({n + 1, nx}), us({n, nu});
+    std::copy_n(guess_->x[guess_->first], (n + 1) * nx, xs.data());
+    std::copy_n(guess_->u[guess_->first], n * nu, us.data());
+    nb::dict result;
+    result["xs"] = xs.release();
+    result["us"] = us.release();
+    return result;
+  }
+
   static double thread_us() {
     timespec t;
     clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
@@ -97,7 +119,7 @@ class StepMemory {
       throw nb::value_error("feet, goal or x0: not finite, or `at` is not a knot of the step");
   }
 
-  HeldTable left_, right_, path_, torque_;
+  HeldTable regression_, path_, torque_;
   StepTables tables_;
   std::unique_ptr<StepWork<Task>> work_;
   std::unique_ptr<StepGuess<Task>> guess_;
@@ -107,11 +129,15 @@ class StepMemory {
 
 void bind_step_memory(nb::module_& engine) {
   using namespace nb::literals;
-  nb::class_<StepMemory>(engine, "TalosStepMemory", "The memory of steps on tables of engram.emit.kinds: regressions, path and torque bases.")
-      .def(nb::init<const nb::object&, const nb::object&, const nb::object&, const nb::object&>(), "left"_a, "right"_a, "path"_a, "torque"_a)
+  nb::class_<StepMemory>(engine, "TalosStepMemory", "The memory of steps on tables of engram.emit.kinds: regression, path and torque bases.")
+      .def(nb::init<const nb::object&, const nb::object&, const nb::object&>(), "regression"_a, "path"_a, "torque"_a)
       .def("query", &StepMemory::query, "feet"_a, "goal"_a, "foot"_a, "x0"_a, "previous"_a = nb::none(), "next"_a = nb::none(), "at"_a = -1,
            "A guess xs (T + 1, nx), us (T, nu) of the step of `foot` from feet (2, 3) to goal (3), from x0 at its knot `at` (-1: its first); "
-           "status, deviation. previous, next: poses (3) of the standing foot before and after, within a walk.")
+           "status. previous, next: poses (3) of the standing foot before and after, within a walk.")
+      .def("decode", &StepMemory::decode, "z"_a, "feet"_a, "goal"_a, "foot"_a, "x0"_a, "previous"_a = nb::none(), "next"_a = nb::none(),
+           "The guess xs, us of coefficients z (m) of another learner.")
+      .def_static("features", &StepMemory::features, "feet"_a, "goal"_a, "foot"_a, "previous"_a = nb::none(), "next"_a = nb::none(),
+                  "What the regression sees of a step (15).")
       .def("query_us", &StepMemory::query_us, "feet"_a, "goal"_a, "foot"_a, "x0"_a, "n"_a, "Processor times [us] of n queries.");
   nb::list other, sign;
   for (int i = 0; i < TalosMirror::nu; ++i) {

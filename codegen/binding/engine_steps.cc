@@ -3,6 +3,10 @@
 #include "codegen/binding/problem.h"
 #include "controller/loop/loop_steps.h"
 
+#include <nanobind/stl/vector.h>
+
+#include <vector>
+
 namespace engram::binding {
 namespace {
 
@@ -11,7 +15,7 @@ class StepProblem : public Problem<TalosSteps::P, TalosSteps::N> {
   static constexpr int nq = R::nq;
 
  public:
-  explicit StepProblem(double cone) : steps_(cone) {}
+  StepProblem(double cone, int between) : steps_(cone, checked(between)) {}
 
   // Feet (2, 3) left and right as (x, y, yaw) [m, rad] on the ground, goals (n, 3), and the foot of the first step; feet alternate.
   void set(const In<2>& feet, const In<2>& goals, int first) {
@@ -36,10 +40,18 @@ class StepProblem : public Problem<TalosSteps::P, TalosSteps::N> {
 
   // Postures (n + 1, nq) at rest before the first and after every step.
   Out stances() {
-    const int n = h().n / TalosSteps::kKnots;
+    const int n = steps_.count();
     NewArray q({std::size_t(n + 1), nq});
     for (int i = 0; i <= n; ++i) std::copy_n(steps_.stance(i), nq, q.row(i));
     return q.release();
+  }
+
+  // The knot at which each step begins, and the last one.
+  std::vector<int> begins() {
+    std::vector<int> knot;
+    for (int i = 0; i < steps_.count(); ++i) knot.push_back(steps_.begins(i));
+    knot.push_back(h().n);
+    return knot;
   }
 
   // Stage one: xs, us, and the largest error of feet and centre of mass.
@@ -108,6 +120,12 @@ class StepProblem : public Problem<TalosSteps::P, TalosSteps::N> {
   }
 
  private:
+  static int checked(int between) {
+    if (between < 2 || between % 2 != 0 || between > TalosSteps::kBefore + TalosSteps::kAfter)
+      throw nb::value_error(("between: expected an even number of knots, 2 .. " + std::to_string(TalosSteps::kBefore + TalosSteps::kAfter)).c_str());
+    return between;
+  }
+
   TalosSteps steps_;
 };
 
@@ -117,12 +135,13 @@ void bind_steps(nb::module_& engine) {
   using namespace nb::literals;
   using C = StepProblem;
   nb::class_<C> c(engine, "TalosSteps", "Steps of Talos from rest to rest: call set(feet, goals, first) first, then solve from a guess. cone: weight of wrenches outside "
-                      "their cones, if not the task's.");
-  c.def(nb::init<double>(), "cone"_a = TalosSteps::Task::weights_cone);
+                      "their cones, between: knots on both feet between two swings, if not the task's.");
+  c.def(nb::init<double, int>(), "cone"_a = TalosSteps::Task::weights_cone, "between"_a = TalosSteps::kBetween);
   bind_problem<C>(c);
   c.def("set", &C::set, "feet"_a, "goals"_a, "first"_a,
         "From rest on feet (2, 3), left and right as (x, y, yaw) [m, rad]; step i brings a foot to goals[i] (n, 3), first 0 (left) or 1.")
       .def("stances", &C::stances, "Postures (n + 1, nq) at rest before the first and after every step.")
+      .def("begins", &C::begins, "The knot at which each step begins, and the last one: a walk's steps change in the middle of `between`.")
       .def("planned", &C::planned, "Stage one of the data: xs, us along the references by inverse kinematics and dynamics; error [m, rad].")
       .def("cold", &C::cold, "torques"_a = true, "xs, us that stand still at x0, with torques that carry the weight or none.")
       .def("along", &C::along, "qs"_a, "moving"_a = true,
@@ -132,6 +151,7 @@ void bind_steps(nb::module_& engine) {
       .def_static("integrate", &C::integrate, "q0"_a, "dq"_a, "q0 (+) dq (n, nq).");
   c.attr("knots") = TalosSteps::kKnots;
   c.attr("before") = TalosSteps::kBefore;
+  c.attr("between") = TalosSteps::kBetween;
   c.attr("swing") = TalosSteps::kSwing;
   c.attr("most") = TalosSteps::most;
   c.attr("dt") = TalosSteps::Task::dt;

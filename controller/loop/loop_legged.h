@@ -13,15 +13,15 @@
 //              static void cone(Param&, double weight, double yaw), swing(Param&, double weight, const Placement&); };
 //
 // References: the posture of robot.toml, turned by the heading; the centre of mass of an inverted pendulum over the gait's centres of
-// pressure (loop_lipm.h), at a height that the task may change; swinging feet on their curves (loop_gait.h). A foot weighs while it swings
-// and, `landing` times more, in the first knot of its stance; in the terminal knot never: that knot has no contact forces, and a swing
-// reference at the end of the horizon would pull at a foot that stands before the plan gets there.
+// pressure (loop_lipm.h), at a height that the task may change; swinging feet on their curves (loop_gait.h). What they weigh:
+// loop_legged_knot.h.
 #ifndef CONTROLLER_LOOP_LOOP_LEGGED_H_
 #define CONTROLLER_LOOP_LOOP_LEGGED_H_
 
 #include "controller/loop/loop_capture.h"
 #include "controller/loop/loop_gait.h"
 #include "controller/loop/loop_hold.h"
+#include "controller/loop/loop_legged_knot.h"
 #include "controller/loop/loop_lipm.h"
 #include "controller/loop/loop_receding.h"
 #include "controller/ocp/ocp_com.h"
@@ -267,53 +267,24 @@ template <class C> const double* LeggedModel<C>::torque_of(unsigned active) cons
 template <class C> template <int c> void LeggedModel<C>::foot(int64_t slot, double dt, bool terminal, double when, Knot& k) const {
   const auto& phase = gait_.at(slot);
   const bool swings = (phase.swing >> c & 1u) != 0;
-  auto& swing = static_cast<typename C::template Swing<c>::template Param<double>&>(k);
-  auto& cone = static_cast<typename C::template Cone<c>::template Param<double>&>(k);
-  C::cone(cone, terminal || swings ? 0.0 : dt * Task::weights_cone, phase.from[c].yaw);
   const bool lands = !swings && slot > 0 && slot == phase.first && (gait_.at(slot - 1).swing >> c & 1u) != 0;
-  const double weight = terminal ? 0.0 : swings ? Task::gait_swing_weight : lands ? Task::gait_swing_weight * Task::gait_landing : 0.0;
   const Placement at = swings ? swing_placement(phase.from[c], phase.to[c], C::Gait::swing_height, phase.share(when)) : phase.from[c];
-  C::swing(swing, dt * weight, at);
+  legged_foot<C, c>(at, swings, lands, Task::weights_cone, dt, terminal, k);
 }
 
 template <class C> void LeggedModel<C>::knot(int64_t utime, int64_t slot, double dt, bool terminal, Knot& k) const {
-  using W = Task;
-  const double weight = terminal ? W::weights_terminal : dt;
-  const double velocity = terminal ? W::weights_terminal * W::weights_terminal_velocity : dt;
-  k.dt = terminal ? 0.0 : dt;
-  const double yaw = heading(utime);
-  std::memcpy(k.state_ref, R::q_home, sizeof(R::q_home));
-  for (int i = 0; i < 3; ++i) k.state_ref[i] = q_[i];
-  k.state_ref[3] = k.state_ref[4] = 0.0;
-  k.state_ref[5] = std::sin(0.5 * yaw);
-  k.state_ref[6] = std::cos(0.5 * yaw);
-  for (int i = 0; i < R::nv; ++i) {
-    const bool leg = i < 6 + C::legs;
-    k.state_ref[R::nq + i] = 0.0;
-    k.state_w[i] = weight * (i < 3 ? 0.0 : i < 6 ? W::weights_orientation : W::weights_posture[leg ? 0 : 1]);
-    k.state_w[R::nv + i] = velocity * (i < 6 ? W::weights_base_velocity : W::weights_velocity[leg ? 0 : 1]);
-  }
   const int at = static_cast<int>(slot - gait_.slot());
   const double when = static_cast<double>(utime - origin_) / static_cast<double>(kStepUs), part = when - static_cast<double>(slot);
+  LeggedReference ref = {q_, heading(utime), gait_.walking() ? pace_.wz : 0.0, {}, {}, torque_of(gait_contacts(slot))};
   for (int i = 0; i < 2; ++i) {
     const double c0 = reference_[i][at], c1 = reference_[i][at + 1];
-    k.com_ref[i] = c0 + part * (c1 - c0);
-    const double v = (c1 - c0) / kStep;  // world axes, into the body's
-    k.state_ref[R::nq] += (i == 0 ? std::cos(yaw) : std::sin(yaw)) * v;
-    k.state_ref[R::nq + 1] += (i == 0 ? -std::sin(yaw) : std::cos(yaw)) * v;
+    ref.com[i] = c0 + part * (c1 - c0);
+    ref.velocity[i] = (c1 - c0) / kStep;
   }
-  k.state_ref[R::nq + 2] = (height(utime + kTickUs) - height(utime)) / (1e-6 * kTickUs);
-  if (gait_.walking()) k.state_ref[R::nq + 5] = pace_.wz;
-  k.com_ref[2] = height(utime);
-  for (int i = 0; i < 3; ++i) k.com_w[i] = weight * W::weights_com[i];
-  const double* const carried = torque_of(gait_contacts(slot));
-  for (int i = 0; i < R::nu; ++i) {
-    const double share = std::fmin(1.0, R::u_max[i] / W::weights_torque_scale);
-    k.torque_w[i] = terminal ? 0.0 : dt * W::weights_torque / (share * share);
-    k.torque_ref[i] = carried[i];
-  }
-  k.limit_w_q = dt * W::weights_limit_q;
-  if constexpr (kReaches<C>) C::reach(k, weight, now_, terminal);
+  ref.com[2] = height(utime);
+  ref.velocity[2] = (height(utime + kTickUs) - height(utime)) / (1e-6 * kTickUs);
+  legged_knot<C>(ref, dt, terminal, k);
+  if constexpr (kReaches<C>) C::reach(k, terminal ? Task::weights_terminal : dt, now_, terminal);
   for_contact<Contacts>([&](auto c) { foot<c>(slot, dt, terminal, when, k); });
 }
 

@@ -1,18 +1,19 @@
-// Steps from rest to rest on flat ground: the optimal control problem of a single step, and of several, over the terms, weights and
-// gait of a walking task (loop_legged.h has them under way, in a horizon that recedes).
+// Steps on flat ground, from rest to rest: the optimal control problem of a single step, and of a walk of several, over the terms and
+// weights of a walking task (loop_legged.h has them under way, in a horizon that recedes).
 //
-//   knots   | before |  swing  | after | before |  swing  | after | ...     a step is kKnots long, a walk of n steps n kKnots
-//   feet    |  both  | stance  | both  |  both  | the other one | ...
-//   zmp     between the feet ---> stance foot, stays, ---> between the feet, or in a walk to the next stance foot; linear on both feet
+//   knots   | before |  swing  | between |    swing     | between | ... | after |     one step is kKnots long
+//   feet    |  both  | stance  |  both   | the other one |  both   | ... |  both |
+//   zmp     from between the feet to the one that stands, where it stays, and on to the next one; at last between the feet again
 //
+// A step of a walk ends, and the next begins, in the middle of `between`.
 // References are those of the walk: posture of robot.toml turned by the heading, the centre of mass of an inverted pendulum over the
-// centre of pressure (loop_lipm.h), the swinging foot on its curve and, `landing` times more, in the first knot of its stance; torques
-// that carry the weight. A walk of one step is the problem of which the memory of steps knows the answers (docs/steps.md).
+// centre of pressure (loop_lipm.h), the swinging foot on its curve, torques that carry the weight.
+// The memory of steps knows the answers (docs/steps.md).
 #ifndef CONTROLLER_LOOP_LOOP_STEPS_H_
 #define CONTROLLER_LOOP_LOOP_STEPS_H_
 
 #include "controller/ik/ik_feet.h"
-#include "controller/loop/loop_gait.h"
+#include "controller/loop/loop_legged_knot.h"
 #include "controller/loop/loop_lipm.h"
 #include "controller/loop/loop_talos.h"
 #include "controller/ocp/ocp_stance.h"
@@ -31,11 +32,14 @@ template <class C, int most_> class Steps {
   static constexpr int most = most_;  // steps
   static constexpr int kBefore = static_cast<int>(Task::gait_before), kSwing = static_cast<int>(Task::gait_swing);
   static constexpr int kAfter = static_cast<int>(Task::gait_after), kKnots = Task::nknots, N = most * kKnots;
+  static constexpr int kBetween = static_cast<int>(Task::gait_between);
   static_assert(kBefore + kSwing + kAfter == kKnots, "phases of a step fill its horizon");
+  static_assert(kBetween % 2 == 0 && kBetween <= kBefore + kAfter, "a step of a walk ends in the middle");
   static_assert(Contacts::n == 2, "one foot stands while the other swings");
 
-  // cone: weight of the wrench outside its cone, if another one than the task's.
-  explicit Steps(double cone = Task::weights_cone) : cone_(cone) {
+  // Other than the task's, if wanted: weight of the wrench outside its cone, and knots on both feet between two swings (an even number, at
+  // most kBefore + kAfter).
+  explicit Steps(double cone = Task::weights_cone, int between = kBetween) : cone_(cone), between_(between) {
     double home[R::nq];
     std::memcpy(home, R::q_home, sizeof(home));
     RbdData<R, double> d;
@@ -64,7 +68,10 @@ template <class C, int most_> class Steps {
     return true;
   }
 
-  int knots() const { return count_ * kKnots; }
+  int count() const { return count_; }
+  int knots() const { return lifts(count_ - 1) + kSwing + kAfter; }
+  // The knot at which step i begins.
+  int begins(int i) const { return i == 0 ? 0 : lifts(i) - between_ / 2; }
   // At rest on the feet of the beginning (i = 0), or after step i: q (nq).
   const double* stance(int i) const { return stance_[i]; }
   double height() const { return height_; }
@@ -114,10 +121,10 @@ template <class C, int most_> class Steps {
   }
 
   // Feet that stand in knot k.
-  unsigned contacts(int k) const { return swings(k) ? 3u & ~(1u << swing_[k / kKnots]) : 3u; }
+  unsigned contacts(int k) const { return swings(k) ? 3u & ~(1u << swing_[step(k)]) : 3u; }
   // Where a foot is, or should be, at knot k.
   Placement placement(int f, int k) const {
-    const int i = step(k), at = k - i * kKnots - kBefore;
+    const int i = step(k), at = k - lifts(i);
     if (f != swing_[i] || at < 0) return feet_[i][f];
     if (at >= kSwing) return feet_[i + 1][f];
     return swing_placement(feet_[i][f], feet_[i + 1][f], Task::gait_height, at / static_cast<double>(kSwing));
@@ -145,10 +152,12 @@ template <class C, int most_> class Steps {
     return {{p[0], p[1], p[2]}, std::atan2(R_WF(1, 0), R_WF(0, 0))};
   }
   static IkFoot ik_foot(const Placement& at) { return {{at.p[0], at.p[1], at.p[2]}, at.yaw}; }
-  int step(int k) const { return k / kKnots < count_ ? k / kKnots : count_ - 1; }
+  // The knot at which the foot of step i leaves the ground; the step of a knot.
+  int lifts(int i) const { return kBefore + i * (kSwing + between_); }
+  int step(int k) const { return std::clamp((k - kBefore + between_ / 2) / (kSwing + between_), 0, count_ - 1); }
   bool swings(int k) const {
-    const int at = k % kKnots;
-    return k < knots() && at >= kBefore && at < kBefore + kSwing;
+    const int at = k - lifts(step(k));
+    return at >= 0 && at < kSwing;
   }
   double ground() const { return 0.5 * (feet_[0][0].p[2] + feet_[0][1].p[2]); }
 
@@ -175,31 +184,30 @@ template <class C, int most_> class Steps {
   // The heading turns while a foot swings, by a quintic.
   Heading heading(int k) const {
     const int i = step(k);
-    const double s = std::fmin(std::fmax((k - i * kKnots - kBefore) / static_cast<double>(kSwing), 0.0), 1.0);
+    const double s = std::fmin(std::fmax((k - lifts(i)) / static_cast<double>(kSwing), 0.0), 1.0);
     const double turn = body_[i + 1].yaw - body_[i].yaw, rate = turn / (kSwing * Task::dt);
     return {body_[i].yaw + turn * s * s * s * (10.0 + s * (-15.0 + 6.0 * s)), rate * 30.0 * s * s * (1.0 - s) * (1.0 - s)};
   }
 
   // Centre of pressure at knot k. At the two ends of a walk it rests for kRest knots between the feet.
   void pressure(int k, double (&zmp)[2]) const {
-    constexpr double kBoth = kAfter + kBefore;
-    const int i = step(k), at = k - i * kKnots, landed = at - kBefore - kSwing;
+    const int i = step(k), lifted = k - lifts(i), landed = lifted - kSwing;
     const Placement& foot = feet_[i][1 - swing_[i]];
     for (int axis = 0; axis < 2; ++axis) {
       const double here = foot.p[axis];
       double other = here, share = 0.0;  // of the other end, when both feet stand
-      if (at < kBefore && i == 0) {
+      if (lifted < 0 && i == 0) {
         other = body_[0].p[axis];
-        share = std::fmin(1.0, (kBefore - at) / static_cast<double>(kBefore - kRest));
-      } else if (at < kBefore) {
+        share = std::fmin(1.0, -lifted / static_cast<double>(kBefore - kRest));
+      } else if (lifted < 0) {
         other = feet_[i - 1][1 - swing_[i - 1]].p[axis];
-        share = (kBefore - at) / kBoth;
+        share = -lifted / static_cast<double>(between_);
       } else if (landed > 0 && i + 1 == count_) {
         other = body_[count_].p[axis];
         share = std::fmin(1.0, landed / static_cast<double>(kAfter - kRest));
       } else if (landed > 0) {
         other = feet_[i + 1][1 - swing_[i + 1]].p[axis];
-        share = landed / kBoth;
+        share = landed / static_cast<double>(between_);
       }
       zmp[axis] = here + share * (other - here);
     }
@@ -220,52 +228,28 @@ template <class C, int most_> class Steps {
   }
 
   template <int f> void foot(int k, double dt, bool terminal, Knot& knot) const {
-    const bool in_air = swings(k) && swing_[k / kKnots] == f;
-    const bool lands = !in_air && k > 0 && swings(k - 1) && swing_[(k - 1) / kKnots] == f;
-    const Placement at = placement(f, k);
-    C::cone(static_cast<typename C::template Cone<f>::template Param<double>&>(knot), terminal || in_air ? 0.0 : dt * cone_, at.yaw);
-    const double weight = terminal ? 0.0 : in_air ? Task::gait_swing_weight : lands ? Task::gait_swing_weight * Task::gait_landing : 0.0;
-    C::swing(static_cast<typename C::template Swing<f>::template Param<double>&>(knot), dt * weight, at);
+    const bool in_air = swings(k) && swing_[step(k)] == f;
+    const bool lands = !in_air && k > 0 && swings(k - 1) && swing_[step(k - 1)] == f;
+    legged_foot<C, f>(placement(f, k), in_air, lands, cone_, dt, terminal, knot);
   }
 
-  // As LeggedModel::knot, about other references.
   void knot(int k, bool terminal, const double* x0, Knot& to) const {
-    using W = Task;
     to = {};
-    const double dt = Task::dt, weight = terminal ? W::weights_terminal : dt;
-    const double velocity = terminal ? W::weights_terminal * W::weights_terminal_velocity : dt;
     const Heading turned = heading(k);
-    to.dt = terminal ? 0.0 : dt;
-    level(turned.yaw, to.state_ref);
-    for (int i = 0; i < 3; ++i) to.state_ref[i] = x0[i];
-    for (int i = 0; i < R::nv; ++i) {
-      const bool leg = i < 6 + C::legs;
-      to.state_w[i] = weight * (i < 3 ? 0.0 : i < 6 ? W::weights_orientation : W::weights_posture[leg ? 0 : 1]);
-      to.state_w[R::nv + i] = velocity * (i < 6 ? W::weights_base_velocity : W::weights_velocity[leg ? 0 : 1]);
-    }
-    const double c = std::cos(turned.yaw), s = std::sin(turned.yaw);
-    double v[2];
+    LeggedReference ref = {x0, turned.yaw, turned.rate, {}, {}, torque_[step(k)][contacts(k)]};
     for (int i = 0; i < 2; ++i) {
-      to.com_ref[i] = com_ref_[i][k];
-      v[i] = (com_ref_[i][k + 1] - com_ref_[i][k]) / dt;
+      ref.com[i] = com_ref_[i][k];
+      ref.velocity[i] = (com_ref_[i][k + 1] - com_ref_[i][k]) / Task::dt;
     }
-    to.com_ref[2] = height_ + ground();
-    to.state_ref[R::nq] = c * v[0] + s * v[1];  // world axes, into the body's
-    to.state_ref[R::nq + 1] = -s * v[0] + c * v[1];
-    to.state_ref[R::nq + 5] = turned.rate;
-    for (int i = 0; i < 3; ++i) to.com_w[i] = weight * W::weights_com[i];
-    for (int i = 0; i < R::nu; ++i) {
-      const double share = std::fmin(1.0, R::u_max[i] / W::weights_torque_scale);
-      to.torque_w[i] = terminal ? 0.0 : dt * W::weights_torque / (share * share);
-      to.torque_ref[i] = torque_[step(k)][contacts(k)][i];
-    }
-    to.limit_w_q = dt * W::weights_limit_q;
-    foot<0>(k, dt, terminal, to);
-    foot<1>(k, dt, terminal, to);
+    ref.com[2] = height_ + ground();
+    legged_knot<C>(ref, Task::dt, terminal, to);
+    foot<0>(k, Task::dt, terminal, to);
+    foot<1>(k, Task::dt, terminal, to);
   }
 
   double cone_;                         // weight of the wrench outside its cone [1/N^2]
   double height_;                       // of the centre of mass above the feet [m]
+  int between_;                         // knots on both feet between two swings
   int count_ = 0, swing_[most];         // steps; the foot that swings in each
   Placement feet_[most + 1][2], body_[most + 1];
   double stance_[most + 1][R::nq];      // at rest before and after every step

@@ -1,14 +1,16 @@
 // The memory of steps: where both feet stand and where one of them goes in, a guess of the optimal step (xs, us) out.
 //
 //   StepTask     one step, poses of feet in any one frame of the ground: alone, or within a walk (from_walk, into_walk)
-//   step_query   its knots step_first .. step_last, or from a later one on; asked when a step enters the horizon, from the plan's last state
+//   step_query   its knots step_first .. step_last, or from a later one on; asked when a step enters the horizon, from its last state
 //
-//   feet, goal -> six numbers: start and goal of the foot that swings, in the axes of the one that stands, mirrored if it is the right one
-//              -> z by regression, one for each foot -> dq(t) = q(t) (-) q(0), u(t) by PCA, one for both feet
-//              -> q = q0 (+) dq,  v_{k+1} = (q_{k+1} (-) q_k) / dt as the integrator has it: gaps are left in v alone
+//   feet, goal -> where the foot that swings starts and goes, in the axes of the one that stands; of a walk also where that one was and
+//                 goes next; mirrored if it is the right one
+//              -> z by regression -> dq(t) = q(t) (-) q_level, u(t) by PCA
+//              -> q = q_level (+) dq,  v_{k+1} = (q_{k+1} (-) q_k) / dt as the integrator has it: gaps are left in v alone
 //
-// The robot's two sides are alike but for some grams, so that the bases are shared and the regressions are not (docs/steps.md).
-// No heap, no exceptions, no I/O; operations: the regression's n (6 + m) + n^2 / 2, then m times the numbers of a step (2660).
+// q_level is home, between the feet and turned as they are: every step has its own frame, and a walk drifts no farther than its feet. Where
+// the robot is not quite where the memory has it, the difference fades within kStepFade knots.
+// No heap, no exceptions, no I/O; operations: the regression's n (15 + m), then m times the numbers of a step (2698).
 #ifndef CONTROLLER_MEMORY_STEP_MEMORY_H_
 #define CONTROLLER_MEMORY_STEP_MEMORY_H_
 
@@ -22,14 +24,13 @@
 namespace engram {
 
 struct StepTables {
-  const TabGpr* regression[2];  // of the left and of the right foot: features (6) -> coefficients (of the path, then of the torques)
-  const TabPca* path;           // -> dq at knots 1 .. N (N, nv) of the left foot's steps
-  const TabPca* torque;         // -> u (N, nu)
+  const TabGpr* regression;  // features -> coefficients (of the path, then of the torques)
+  const TabPca* path;        // -> dq at knots 0 .. N (N + 1, nv) of the left foot's steps
+  const TabPca* torque;      // -> u (N, nu)
 };
 
-inline constexpr int kStepFeatures = 6, kStepMaxCoefficients = 192;
-
-inline constexpr int kStepBetween = 4;  // knots on both feet between two swings of a walk; a step has half of them at either end
+inline constexpr int kStepFeatures = 15, kStepMaxCoefficients = 192;
+inline constexpr int kStepFade = 8;  // knots
 
 // A step. Poses (x, y, yaw) [m, rad] in any one frame of the ground.
 struct StepTask {
@@ -40,14 +41,16 @@ struct StepTask {
   bool into_walk = false;       // another step comes after; or the robot comes to rest
   double previous[3] = {};      // from_walk: where the foot that stands now stood before it swung
   double next[3] = {};          // into_walk: where the foot that stands now goes in the step after
+  double ground = 0.0;          // height of the feet [m]
 };
 
-// The first knot of a step, and the last, where the one after begins: of Task::nknots from rest to rest, those about its swing in a walk.
+// The first knot of a step, and the last, where the one after begins: 0 and Task::nknots at rest; in a walk in the middle of the
+// gait_between knots on both feet.
 template <class Task> constexpr int step_first(const StepTask& t) {
-  return t.from_walk ? static_cast<int>(Task::gait_before) - kStepBetween / 2 : 0;
+  return t.from_walk ? static_cast<int>(Task::gait_before - Task::gait_between / 2) : 0;
 }
 template <class Task> constexpr int step_last(const StepTask& t) {
-  return t.into_walk ? static_cast<int>(Task::gait_before + Task::gait_swing) + kStepBetween / 2 : Task::nknots;
+  return t.into_walk ? static_cast<int>(Task::gait_before + Task::gait_swing + Task::gait_between / 2) : Task::nknots;
 }
 
 // Task: tables/<robot>_<task>/task.h; Mirror: which driven dof takes which other one's place, and its sign, seen in a mirror.
@@ -58,13 +61,12 @@ template <class Task> struct StepGuess {
   double u[N][R::nu];
   int first, last;    // knots of x that are filled; of u all but the last
   TabStatus status;   // kTabOutside: the task lies outside what was learnt
-  double deviation;   // of the regression, relative to its prior: 0 (known) .. 1 (unknown)
 };
 
 template <class Task> struct StepWork {
   using R = typename Task::Robot;
   alignas(64) float z[kStepMaxCoefficients + TAB_LANES], z_torque[kStepMaxCoefficients + TAB_LANES];
-  alignas(64) float path[Task::nknots * R::nv + TAB_LANES], torque[Task::nknots * R::nu + TAB_LANES];
+  alignas(64) float path[(Task::nknots + 1) * R::nv + TAB_LANES], torque[Task::nknots * R::nu + TAB_LANES];
 };
 
 // Talos: legs, torso, arms with grippers, head. Rolls and yaws change their sign, pitches and grippers do not.
@@ -81,13 +83,12 @@ struct TalosMirror {
 template <class Task> TabStatus step_check(const StepTables& tables, char* text) {
   using R = typename Task::Robot;
   const auto checked = [&](const TabHead* head, TabKind kind) { return tab_check(head, kind, R::digest, Task::digest, text) == kTabOk; };
-  for (const TabGpr* regression : tables.regression)
-    if (!checked(regression ? &regression->head : nullptr, kTabGpr)) return kTabBad;
+  if (!checked(tables.regression ? &tables.regression->head : nullptr, kTabGpr)) return kTabBad;
   if (!checked(tables.path ? &tables.path->head : nullptr, kTabPca)) return kTabBad;
   if (!checked(tables.torque ? &tables.torque->head : nullptr, kTabPca)) return kTabBad;
-  bool fit = tables.path->n == Task::nknots * R::nv && tables.torque->n == Task::nknots * R::nu;
-  for (const TabGpr* regression : tables.regression)
-    fit = fit && regression->d == kStepFeatures && regression->m == tables.path->m + tables.torque->m && regression->m <= kStepMaxCoefficients;
+  const TabGpr& z = *tables.regression;
+  const bool fit = tables.path->n == (Task::nknots + 1) * R::nv && tables.torque->n == Task::nknots * R::nu && z.d == kStepFeatures &&
+                   z.m == tables.path->m + tables.torque->m && z.m <= kStepMaxCoefficients;
   if (fit) return kTabOk;
   constexpr char kMisfit[] = "the tables of steps do not fit each other; run 'engram fit talos step' and build again";
   static_assert(sizeof kMisfit <= TAB_TEXT, "fits the caller's buffer");
@@ -95,15 +96,74 @@ template <class Task> TabStatus step_check(const StepTables& tables, char* text)
   return kTabBad;
 }
 
+// The features of a step: start, goal, previous and next (x, y, yaw), each in the axes of the foot that stands meanwhile; whether it
+// comes from a walk and goes into one; the foot.
 inline void step_features(const StepTask& t, double (&x)[kStepFeatures]) {
+  const double mirror = t.foot == 0 ? 1.0 : -1.0;
+  const auto see = [&](const double* frame, const double* at, double* seen) {
+    const double c = std::cos(frame[2]), s = std::sin(frame[2]), dx = at[0] - frame[0], dy = at[1] - frame[1];
+    seen[0] = c * dx + s * dy;
+    seen[1] = mirror * (-s * dx + c * dy);
+    seen[2] = mirror * (at[2] - frame[2]);
+  };
   const double* const stands = t.feet[1 - t.foot];
-  const double c = std::cos(stands[2]), s = std::sin(stands[2]), mirror = t.foot == 0 ? 1.0 : -1.0;
-  const double* const seen[2] = {t.feet[t.foot], t.goal};
-  for (int i = 0; i < 2; ++i) {
-    const double dx = seen[i][0] - stands[0], dy = seen[i][1] - stands[1];
-    x[3 * i] = c * dx + s * dy;
-    x[3 * i + 1] = mirror * (-s * dx + c * dy);
-    x[3 * i + 2] = mirror * (seen[i][2] - stands[2]);
+  std::memset(x, 0, sizeof x);
+  see(stands, t.feet[t.foot], x);
+  see(stands, t.goal, x + 3);
+  if (t.from_walk) see(t.feet[t.foot], t.previous, x + 6);
+  if (t.into_walk) see(t.goal, t.next, x + 9);
+  x[12] = t.from_walk;
+  x[13] = t.into_walk;
+  x[14] = t.foot;
+}
+
+// The posture at home between the feet at the beginning of a step: q (nq).
+template <class R> void step_level(const StepTask& t, double* q) {
+  std::memcpy(q, R::q_home, sizeof(R::q_home));
+  for (int i = 0; i < 2; ++i) q[i] = 0.5 * (t.feet[0][i] + t.feet[1][i]);
+  q[2] += t.ground;
+  const double half = 0.25 * (t.feet[0][2] + t.feet[1][2]);  // of the heading
+  q[3] = q[4] = 0.0;
+  q[5] = std::sin(half);
+  q[6] = std::cos(half);
+}
+
+// The guess of the coefficients w.z, from knot `at` of the step on, where the robot has the state x0.
+template <class Task, class Mirror>
+void step_decode(const StepTables& tables, const StepTask& task, int at, const double* x0, StepWork<Task>& w, StepGuess<Task>& guess) {
+  using R = typename Task::Robot;
+  constexpr int nq = R::nq, nv = R::nv, nu = R::nu, base = nv - nu;
+  static_assert(base == 6 && Mirror::nu == nu, "a free base and driven joints");
+  std::memcpy(w.z_torque, w.z + tables.path->m, sizeof(float) * tables.torque->m);
+  tab_pca_decode(tables.path, w.z, w.path);
+  tab_pca_decode(tables.torque, w.z_torque, w.torque);
+
+  const bool left = task.foot == 0;
+  double level[nq], off[nv];
+  step_level<R>(task, level);
+  const auto remembered = [&](int k, double* q) {
+    const float* const dq = w.path + k * nv;
+    double moved[nv];
+    for (int i = 0; i < base; ++i) moved[i] = left ? dq[i] : Mirror::base[i] * dq[i];
+    for (int i = 0; i < nu; ++i) moved[base + i] = left ? dq[base + i] : Mirror::sign[i] * dq[base + Mirror::other[i]];
+    rbd_integrate<R>(level, moved, q);
+  };
+  double q[nq];
+  remembered(at, q);
+  rbd_difference<R>(q, x0, off);
+  guess.first = at;
+  guess.last = step_last<Task>(task);
+  std::memcpy(guess.x[at], x0, sizeof(guess.x[at]));
+  for (int k = at; k < guess.last; ++k) {
+    const float* const u = w.torque + k * nu;
+    for (int i = 0; i < nu; ++i) guess.u[k][i] = left ? u[i] : Mirror::sign[i] * u[Mirror::other[i]];
+    const double s = std::fmin(1.0, (k + 1 - at) / static_cast<double>(kStepFade)), rest = 1.0 - s * s * s * (10.0 + s * (-15.0 + 6.0 * s));
+    double fading[nv], moved[nv];
+    for (int i = 0; i < nv; ++i) fading[i] = rest * off[i];
+    remembered(k + 1, q);
+    rbd_integrate<R>(q, fading, guess.x[k + 1]);
+    rbd_difference<R>(guess.x[k], guess.x[k + 1], moved);
+    for (int i = 0; i < nv; ++i) guess.x[k + 1][nq + i] = moved[i] / Task::dt;
   }
 }
 
@@ -112,41 +172,14 @@ inline void step_features(const StepTask& t, double (&x)[kStepFeatures]) {
 template <class Task, class Mirror>
 bool step_query(const StepTables& tables, const StepTask& task, int at, const double* x0, StepWork<Task>& w, StepGuess<Task>& guess) {
   using R = typename Task::Robot;
-  constexpr int nq = R::nq, nv = R::nv, nu = R::nu, base = nv - nu;
-  static_assert(base == 6 && Mirror::nu == nu, "a free base and driven joints");
-  guess.first = at;
-  guess.last = step_last<Task>(task);
-  if (at < step_first<Task>(task) || at >= guess.last) return false;
+  if (at < step_first<Task>(task) || at >= step_last<Task>(task)) return false;
+  for (int i = 0; i < R::nq + R::nv; ++i)
+    if (!std::isfinite(x0[i])) return false;
   double features[kStepFeatures];
   step_features(task, features);
-  for (int i = 0; i < nq + nv; ++i)
-    if (!std::isfinite(x0[i])) return false;
-  float variance;
-  const int foot = task.foot;
-  const TabGpr& regression = *tables.regression[foot];
-  guess.status = tab_gpr_query(&regression, features, w.z, &variance);
+  guess.status = tab_gpr_query(tables.regression, features, w.z, nullptr);
   if (guess.status == kTabNotFinite) return false;
-  if (task.from_walk || task.into_walk) guess.status = kTabOutside;  // the tables know steps from rest to rest
-  guess.deviation = std::sqrt(variance / (regression.variance + regression.noise));
-  tab_pca_decode(tables.path, w.z, w.path);
-  tab_pca_decode(tables.torque, w.z + tables.path->m, w.torque);
-
-  std::memcpy(guess.x[at], x0, sizeof(guess.x[at]));
-  for (int k = at; k < guess.last; ++k) {
-    const float* const dq = w.path + k * nv;
-    const float* const start = w.path + (at - 1) * nv;
-    const float* const u = w.torque + k * nu;
-    const auto moved_by = [&](int i) { return at > 0 ? dq[i] - start[i] : dq[i]; };
-    double step[nv], moved[nv];
-    for (int i = 0; i < base; ++i) step[i] = foot == 0 ? moved_by(i) : Mirror::base[i] * moved_by(i);
-    for (int i = 0; i < nu; ++i) {
-      step[base + i] = foot == 0 ? moved_by(base + i) : Mirror::sign[i] * moved_by(base + Mirror::other[i]);
-      guess.u[k][i] = foot == 0 ? u[i] : Mirror::sign[i] * u[Mirror::other[i]];
-    }
-    rbd_integrate<R>(x0, step, guess.x[k + 1]);
-    rbd_difference<R>(guess.x[k], guess.x[k + 1], moved);
-    for (int i = 0; i < nv; ++i) guess.x[k + 1][nq + i] = moved[i] / Task::dt;
-  }
+  step_decode<Task, Mirror>(tables, task, at, x0, w, guess);
   return true;
 }
 

@@ -63,7 +63,7 @@ bool sizes_fit(const TabHead& h) {
       const TabGpr& t = reinterpret_cast<const TabGpr&>(h);
       return t.n > 0 && t.n <= TAB_GPR_MAX_N && t.d == h.nin && t.m == h.nout && count(2) == t.d &&
              count(3) == int64_t{tab_pad(t.n)} * t.d && count(4) == int64_t{t.n} * tab_pad(t.m) && count(5) == tab_pad(t.m) &&
-             count(6) == tab_gpr_linv_size(t.n);
+             (count(6) == tab_gpr_linv_size(t.n) || (!t.linv && count(6) < 0));
     }
     case kTabPca: {
       const TabPca& t = reinterpret_cast<const TabPca&>(h);

@@ -34,7 +34,7 @@ extern "C" TabStatus tab_gpr_query(const TabGpr* tab, const double* x, float* me
   }
 
   // var = s + noise - |Linv k|^2
-  if (var) {
+  if (var && tab->linv) {
     double explained = 0;
     const float* row = tab->linv;
     for (int32_t i = 0; i < n; ++i) {

@@ -23,11 +23,11 @@ typedef struct TabGpr {
   const float* x;           /* (pad(n)/8, d, 8)  x_i / l_i of sample 8 b + lane; padding samples: TAB_FAR */
   const float* alpha;       /* (n, pad(m)) */
   const float* mean;        /* (pad(m))          y0 */
-  const float* linv;        /* rows 0..n-1 of the lower triangle of L^-1, row i padded to pad(i + 1) */
+  const float* linv;        /* rows 0..n-1 of the lower triangle of L^-1, row i padded to pad(i + 1); NULL: no variance */
 } TabGpr;
 
 /* Mean (m floats, room for pad(m)) and, where var is not NULL, the variance (one float: the same for all outputs, relative to their
- * normalisation). A query that is not finite gives the prior: mean y0 and variance s + noise.
+ * normalisation; of a table without linv the prior's). A query that is not finite gives the prior: mean y0 and variance s + noise.
  * n (d + m) multiply-adds and n exponentials; the variance adds n^2 / 2. */
 TabStatus tab_gpr_query(const TabGpr* tab, const double* x, float* mean, float* var);
 

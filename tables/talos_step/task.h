@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct TalosStep {
   using Robot = robots::Talos;
   static constexpr char name[] = "talos_step";
-  static constexpr uint64_t digest = 0xd2e316fff702171e;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x22e8c507784008dd;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 9;
@@ -62,6 +62,7 @@ struct TalosStep {
   static constexpr double gait_before = 0x1.8p+3;  // 12
   static constexpr double gait_swing = 0x1.cp+3;  // 14
   static constexpr double gait_after = 0x1.8p+3;  // 12
+  static constexpr double gait_between = 0x1p+2;  // 4
   static constexpr double gait_height = 0x1.eb851eb851eb8p-5;  // 0.06
   static constexpr double gait_swing_weight = 0x1.86ap+16;  // 100000
   static constexpr double gait_landing = 0x1.ep+4;  // 30

@@ -17,7 +17,7 @@ namespace {
 using Task = tasks::TalosStep;
 
 TEST(StepMemory, AsksForNoHeap) {
-  const StepTables tables = {{&talos_step_left_v1, &talos_step_right_v1}, &talos_step_path_v1, &talos_step_torque_v1};
+  const StepTables tables = {&talos_step_regression_v1, &talos_step_path_v1, &talos_step_torque_v1};
   const StepTask task = {{{0.02, 0.09, 0.05}, {-0.02, -0.09, -0.05}}, {0.2, 0.1, 0.1}};
   double x0[Task::Robot::nq + Task::Robot::nv] = {};
   std::memcpy(x0, Task::Robot::q_home, sizeof(Task::Robot::q_home));

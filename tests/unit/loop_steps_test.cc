@@ -31,13 +31,24 @@ template <int foot, class Knot> double weight(const Knot& k) {
   return static_cast<const typename TalosBody<tasks::TalosStep, 20>::Swing<foot>::template Param<double>&>(k).placement_w;
 }
 
+constexpr int kPeriod = TalosSteps::kSwing + TalosSteps::kBetween;
+
+// The step that a knot's foot swings in, if it were one of two, and knots since that foot left the ground.
+struct When {
+  int step, lifted;
+  explicit When(int k)
+      : step(k >= TalosSteps::kBefore + TalosSteps::kSwing + TalosSteps::kBetween / 2), lifted(k - TalosSteps::kBefore - step * kPeriod) {}
+};
+
 TEST(Steps, FeetStandSwingAndStand) {
   const auto p = two_steps();
-  ASSERT_EQ(p->h.n, 2 * TalosSteps::kKnots);
+  ASSERT_EQ(p->h.n, TalosSteps::kKnots + kPeriod);
+  EXPECT_EQ(p->steps.begins(0), 0);
+  EXPECT_EQ(p->steps.begins(1), TalosSteps::kBefore + TalosSteps::kSwing + TalosSteps::kBetween / 2);
   for (int k = 0; k < p->h.n; ++k) {
-    const int at = k % TalosSteps::kKnots;
-    const bool swings = at >= TalosSteps::kBefore && at < TalosSteps::kBefore + TalosSteps::kSwing;
-    EXPECT_EQ(p->h.phase[k], swings ? (k < TalosSteps::kKnots ? 2u : 1u) : 3u) << k;
+    const When when(k);
+    const bool swings = when.lifted >= 0 && when.lifted < TalosSteps::kSwing;
+    EXPECT_EQ(p->h.phase[k], swings ? (when.step == 0 ? 2u : 1u) : 3u) << k;
   }
 }
 
@@ -46,12 +57,12 @@ TEST(Steps, AFootWeighsWhileItSwingsAndAsItLandsOnly) {
   const auto p = two_steps();
   const double swing = tasks::TalosStep::dt * tasks::TalosStep::gait_swing_weight;
   for (int k = 0; k <= p->h.n; ++k) {
-    const int step = k / TalosSteps::kKnots, at = k % TalosSteps::kKnots - TalosSteps::kBefore;
-    const double expected = k == p->h.n || at < 0 || at > TalosSteps::kSwing ? 0.0
-                            : at < TalosSteps::kSwing                       ? swing
-                                                                            : swing * tasks::TalosStep::gait_landing;
-    EXPECT_EQ(weight<0>(p->h.knot[k]), step == 0 ? expected : 0.0) << k;
-    EXPECT_EQ(weight<1>(p->h.knot[k]), step == 1 ? expected : 0.0) << k;
+    const When when(k);
+    const double expected = k == p->h.n || when.lifted < 0 || when.lifted > TalosSteps::kSwing ? 0.0
+                            : when.lifted < TalosSteps::kSwing                                 ? swing
+                                                                                               : swing * tasks::TalosStep::gait_landing;
+    EXPECT_EQ(weight<0>(p->h.knot[k]), when.step == 0 ? expected : 0.0) << k;
+    EXPECT_EQ(weight<1>(p->h.knot[k]), when.step == 1 ? expected : 0.0) << k;
   }
 }
 
@@ -79,7 +90,7 @@ TEST(Steps, StancesStandOnTheirFeet) {
       Mat3<double> R_WF;
       Vec3<double> at;
       rbd_frame_placement<TalosSteps::R>(d, TalosSteps::Contacts::frame[f], R_WF, at);
-      const Placement wanted = i == 0 ? p->steps.placement(f, 0) : p->steps.placement(f, i * TalosSteps::kKnots - 1);
+      const Placement wanted = i == 0 ? p->steps.placement(f, 0) : p->steps.placement(f, i < 2 ? p->steps.begins(i) : p->h.n);
       for (int e = 0; e < 3; ++e) EXPECT_NEAR(at[e], wanted.p[e], 1e-4);  // what plan() promises
       EXPECT_NEAR(std::atan2(R_WF(1, 0), R_WF(0, 0)), wanted.yaw, 1e-4);
     }

@@ -16,7 +16,7 @@ namespace {
 using Task = tasks::TalosStep;
 using R = Task::Robot;
 constexpr int nq = R::nq, nv = R::nv, nu = R::nu;
-const StepTables kTables = {{&talos_step_left_v1, &talos_step_right_v1}, &talos_step_path_v1, &talos_step_torque_v1};
+const StepTables kTables = {&talos_step_regression_v1, &talos_step_path_v1, &talos_step_torque_v1};
 
 struct Query {
   StepTask task = {{{0.02, 0.09, 0.05}, {-0.02, -0.09, -0.05}}, {0.2, 0.1, 0.1}};
@@ -32,10 +32,10 @@ struct Query {
 TEST(StepMemory, TheTablesOfTheTreeFit) {
   char text[TAB_TEXT];
   EXPECT_EQ(step_check<Task>(kTables, text), kTabOk) << text;
-  const StepTables swapped = {{&talos_step_left_v1, &talos_step_right_v1}, &talos_step_torque_v1, &talos_step_path_v1};
+  const StepTables swapped = {&talos_step_regression_v1, &talos_step_torque_v1, &talos_step_path_v1};
   EXPECT_EQ(step_check<Task>(swapped, text), kTabBad);
   EXPECT_NE(std::string(text).find("engram fit talos step"), std::string::npos) << text;
-  const StepTables missing = {{&talos_step_left_v1, nullptr}, &talos_step_path_v1, &talos_step_torque_v1};
+  const StepTables missing = {nullptr, &talos_step_path_v1, &talos_step_torque_v1};
   EXPECT_EQ(step_check<Task>(missing, text), kTabBad);
 }
 
@@ -43,7 +43,6 @@ TEST(StepMemory, StartsWhereTheRobotIsAndMovesAsTheIntegratorDoes) {
   Query q;
   ASSERT_TRUE(q.ask());
   EXPECT_EQ(q.guess->status, kTabOk);
-  EXPECT_LT(q.guess->deviation, 0.1);
   EXPECT_EQ(std::memcmp(q.guess->x[0], q.x0, sizeof(q.x0)), 0);
   for (int k = 0; k < Task::nknots; ++k) {  // the integrator: q' = q (+) dt v'
     double dq[nv], next[nq];
@@ -91,7 +90,6 @@ TEST(StepMemory, FarTasksAreSaidToBeFar) {
   q.task.goal[0] = 0.8;
   ASSERT_TRUE(q.ask());
   EXPECT_EQ(q.guess->status, kTabOutside);
-  EXPECT_GT(q.guess->deviation, 0.5);
 }
 
 TEST(StepMemory, WhatIsNotFiniteGivesNoGuess) {
@@ -111,7 +109,7 @@ TEST(StepMemory, AStepOfAWalkIsShorterAndMayBeAskedFromAnyKnot) {
   const double stood[3] = {-0.2, -0.09, -0.05}, goes[3] = {0.4, -0.09, 0.1};
   std::memcpy(q.task.previous, stood, sizeof(stood));
   std::memcpy(q.task.next, goes, sizeof(goes));
-  EXPECT_EQ(step_last<Task>(q.task) - step_first<Task>(q.task), Task::gait_swing + kStepBetween);
+  EXPECT_EQ(step_last<Task>(q.task) - step_first<Task>(q.task), Task::gait_swing + Task::gait_between);
   EXPECT_FALSE(q.ask());  // knot 0 is not one of its knots
   for (q.at = step_first<Task>(q.task); q.at < step_last<Task>(q.task); q.at += 5) {
     ASSERT_TRUE(q.ask());

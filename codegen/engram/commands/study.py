@@ -18,6 +18,8 @@ ROWS = {
     "6.8": "arms",
     "7.1": "pole",
     "9.1": "step_curves",
+    "9.2": "step_choice",
+    "9.3": "step_active",
 }
 
 EXAMPLES = """examples:

@@ -3,7 +3,7 @@
 A task is where both feet stand and where one of them goes, x in R^9: left, right, goal, each (x, y, yaw) [m, rad] in the
 frame of the body (middle of the feet at the start, mean of their headings). Stage one (*Hpp*) plans it: centre of mass by a
 pendulum, swing foot by a curve, inverse kinematics, inverse dynamics. Stage two (*Crl*) refines that by FDDP. Item i depends
-on (seed, foot, i) alone.
+on (seed, foot, i) alone. Walks of three steps are made in the same way: steps that begin or end under way are cut out of them.
 """
 
 import math
@@ -17,6 +17,7 @@ from engram.data.chunks import Arrays
 from engram.engine import engine
 
 FEET = ("left", "right")  # that swing: 0, 1, as the engine counts them
+WALKS = 2  # in the place of a foot: walks
 # Of the swinging foot in the axes of the other one, which stands; y away from it. [m, m, rad]
 START_LO, START_HI = np.array([-0.30, 0.15, -0.25]), np.array([0.30, 0.28, 0.25])
 GOAL_LO, GOAL_HI = np.array([-0.25, 0.15, -0.25]), np.array([0.33, 0.28, 0.25])
@@ -24,6 +25,9 @@ GOAL_LO, GOAL_HI = np.array([-0.25, 0.15, -0.25]), np.array([0.33, 0.28, 0.25])
 OK, NO_POSTURE, NOT_PLANNED, NOT_CONVERGED, MISSED, TOO_STRONG = range(6)
 REASONS = ["solved", "no posture stands on the feet", "no posture follows the plan", "not converged", "foot lands too far off",
            "torque beyond its limit"]  # fmt: skip
+
+
+WALK = 3  # steps of a walk: its first, one in the middle, its last
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ def draw(seed: int, foot: int, i: int) -> np.ndarray:
     return step_vector(feet, goal)
 
 
-def draw_walk(seed: int, steps: int, i: int) -> tuple[np.ndarray, np.ndarray, int]:
+def draw_walk(seed: int, i: int, steps: int = WALK) -> tuple[np.ndarray, np.ndarray, int]:
     """Walk i: feet (2, 3), goals (steps, 3), the foot of the first step; every step within the range of single ones."""
     rng = np.random.default_rng([seed, 2, i])
     first = int(rng.integers(2))
@@ -92,12 +96,12 @@ class StepSolver:
         self.problem = engine.TalosSteps()
         self.nq = self.problem.nx - self.problem.nv
 
-    def solve(self, x: np.ndarray, foot: int) -> dict:
-        """Both stages of a task x (9,): q, u of each, cost, iterations, outcome."""
+    def solve(self, feet: np.ndarray, goals: np.ndarray, first: int) -> dict:
+        """Both stages of steps from feet (2, 3) to goals (n, 3): q, u of each, cost, iterations, outcome."""
         problem, settings = self.problem, self.settings
-        row = self.nothing(x)
+        row = self.nothing(len(goals))
         try:
-            problem.set(x[:6].reshape(2, 3), x[None, 6:], foot)
+            problem.set(feet, goals, first)
         except ValueError:
             return row | {"outcome": NO_POSTURE}
         planned = problem.planned()
@@ -107,27 +111,38 @@ class StepSolver:
         found = problem.solve(planned["xs"], planned["us"], iterations=settings.iterations, stop=settings.stop)
         row |= {"q": found["xs"][:, : self.nq].astype(np.float32), "u": found["us"].astype(np.float32),
                 "cost": found["cost"], "iterations": found["iterations"]}  # fmt: skip
-        return row | {"outcome": self.judge(found, x, foot)}
+        return row | {"outcome": self.judge(found, goals, first)}
 
-    def judge(self, found: dict, x: np.ndarray, foot: int) -> int:
+    def judge(self, found: dict, goals: np.ndarray, first: int) -> int:
         """OK or the first reason against a solution."""
         if not found["converged"]:
             return NOT_CONVERGED
         feet, _ = self.problem.feet(found["xs"][:, : self.nq])
-        if np.abs(feet[-1, foot, [0, 1, 3]] - x[6:]).max() > self.settings.landing:
-            return MISSED
+        for i, (end, goal) in enumerate(zip(self.problem.begins()[1:], goals, strict=True)):
+            if np.abs(feet[end, (first + i) % 2][[0, 1, 3]] - goal).max() > self.settings.landing:
+                return MISSED
         return OK if np.all(np.abs(found["us"]) <= engine.talos.u_max) else TOO_STRONG
 
-    def nothing(self, x: np.ndarray) -> dict:
+    def nothing(self, steps: int) -> dict:
         """The row of a task before anything is known about it."""
-        T, nu = self.problem.knots, self.problem.nu
+        T, nu = self.problem.knots + (steps - 1) * (self.problem.swing + self.problem.between), self.problem.nu
         q, u = np.zeros((T + 1, self.nq), np.float32), np.zeros((T, nu), np.float32)
-        return {"X": x, "q_raw": q, "u_raw": u, "q": q, "u": u, "cost": np.nan, "iterations": 0}
+        return {"q_raw": q, "u_raw": u, "q": q, "u": u, "cost": np.nan, "iterations": 0}
+
+
+def draw_row(seed: int, foot: int, i: int) -> tuple[dict, tuple[np.ndarray, np.ndarray, int]]:
+    """Item i of a foot, or of the walks (foot 2): how its row begins, and feet, goals, first foot."""
+    if foot == WALKS:
+        feet, goals, first = draw_walk(seed, i)
+        return {"X": np.vstack([feet, goals]).ravel(), "first": first, "seeds": i}, (feet, goals, first)
+    x = draw(seed, foot, i)
+    return {"X": x, "seeds": i}, (x[:6].reshape(2, 3), x[None, 6:], foot)
 
 
 def solve_items(solver: StepSolver, foot: int, items: range) -> Arrays:
-    """The items of a foot."""
-    rows = [solver.solve(draw(solver.seed, foot, i), foot) | {"seeds": i} for i in items]
+    """The items of a foot, or the walks."""
+    drawn = [draw_row(solver.seed, foot, i) for i in items]
+    rows = [row | solver.solve(*task) for row, task in drawn]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 

@@ -92,7 +92,8 @@ class Knn(Table):
 
 @dataclass(kw_only=True)
 class Gpr(Table):
-    """Gaussian process. x (n, d), length (d,), alpha (n, m), mean (m,), linv (n, n) lower; kernel variance and noise."""
+    """Gaussian process. x (n, d), length (d,), alpha (n, m), mean (m,), linv (n, n) lower, or None: the table knows no variance;
+    kernel variance and noise."""
 
     x: np.ndarray
     length: np.ndarray
@@ -100,7 +101,7 @@ class Gpr(Table):
     noise: float
     alpha: np.ndarray
     mean: np.ndarray
-    linv: np.ndarray
+    linv: np.ndarray | None
 
     def __post_init__(self) -> None:
         self.kind, self.constant = "gpr", "kTabGpr"
@@ -116,13 +117,16 @@ class Gpr(Table):
     def own_arrays(self) -> list[Array]:
         inverse = array("inv_length", "1 / length scale of each input", 1.0 / self.length)
         scaled = np.asarray(self.x, np.float32) * inverse.flat
-        return [
+        arrays = [
             inverse,
             array("x", "scaled inputs, blocks of (d, 8 samples)", blocks(scaled)),
             array("alpha", "(n, pad(m)) weights of the mean", padded_rows(self.alpha)),
             array("mean", "(pad(m)) prior mean", padded_rows(self.mean)),
-            array("linv", "lower triangle of the inverse Cholesky factor, row i padded to pad(i + 1)", triangle(self.linv)),
         ]
+        if self.linv is not None:
+            about = "lower triangle of the inverse Cholesky factor, row i padded to pad(i + 1)"
+            arrays.append(array("linv", about, triangle(self.linv)))
+        return arrays
 
 
 @dataclass(kw_only=True)

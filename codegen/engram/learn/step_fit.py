@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from engram.data.step_set import NAME, StepData, load
+from engram.data.steps import WALK, WALKS
 from engram.emit import write_tables
 from engram.engine import engine
 from engram.inputs import InputError
@@ -26,20 +27,24 @@ def split(steps: StepData) -> tuple[StepData, StepData]:
     return steps.part(~held), steps.part(held)
 
 
+def steps_in(sets: list[StepData]) -> int:
+    """Steps of both feet and of the walks."""
+    return sum(map(len, sets[:WALKS])) + WALK * len(sets[WALKS])
+
+
 def nbytes(tables: StepTables) -> int:
     """Bytes of all arrays."""
-    four = (tables.left, tables.right, tables.path, tables.torque)
-    return sum(4 * item.words.size for table in four for item in table.arrays())
+    return sum(4 * item.words.size for table in tables.all for item in table.arrays())
 
 
 def fit_and_write(data: Path, out: Path) -> None:
     """Fit on all but the held-out steps, write tables/talos_step/, print and record the figures. Raises InputError."""
     sets, digest, made_from = load(data)
-    if min(map(len, sets)) < FEWEST:
-        raise InputError(f"{relative(data)}: holds {min(map(len, sets))} steps of a foot, at least {FEWEST} are needed; "
+    if min(map(len, sets[:WALKS])) < FEWEST:
+        raise InputError(f"{relative(data)}: holds {min(map(len, sets[:WALKS]))} steps of a foot, at least {FEWEST} are needed; "
                          "run `engram data talos step` with a larger --n")  # fmt: skip
     train, test = zip(*map(split, sets), strict=True)
-    print(f"fit:    {sum(map(len, train))} steps, {sum(map(len, test))} of them held out", flush=True)
+    print(f"fit:    {steps_in(sets)} steps, {steps_in(test)} of them held out", flush=True)
     tables = fit(list(train), list(test), Settings())
     size = nbytes(tables)
     if size > LIMIT:
@@ -47,15 +52,15 @@ def fit_and_write(data: Path, out: Path) -> None:
     manifest = write_tables(
         out / NAME,
         NAME,
-        [tables.left, tables.right, tables.path, tables.torque],
+        list(tables.all),
         robot_digest=engine.talos.digest,
         task_digest=engine.TalosSteps.digest,
         data_digest=digest,
-        provenance=f"engram fit talos step; {made_from}; {sum(map(len, train))} steps",
+        provenance=f"engram fit talos step; {made_from}; {steps_in(train)} steps",
     )
-    n = sum(map(len, test))
+    n = steps_in(test)
     figures = [(f"{table.role}.rms", table.held_out_error, table.held_out_text.split("]")[0][1:], n)
-               for table in (tables.left, tables.right, tables.path, tables.torque)]  # fmt: skip
+               for table in tables.all]  # fmt: skip
     x, problem = test[0].X[0], engine.TalosSteps()
     problem.set(x[:6].reshape(2, 3), x[None, 6:], 0)
     us = tables.memory().query_us(x[:6].reshape(2, 3), x[6:], 0, problem.x0, QUERIES)

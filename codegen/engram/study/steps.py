@@ -8,15 +8,17 @@ iteration that finds the rule fulfilled counts, so that two are the least from a
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from engram.data import step_set, steps
 from engram.data.step_set import StepData
+from engram.emit import Knn, Table
 from engram.engine import engine
 from engram.learn.mixture import condition, fit_gaussian, mixture_table
 from engram.learn.step_fit import split
-from engram.learn.steps import INPUTS, Settings, StepTables, features, fit, mirrored, mirrored_controls, mirrored_dofs
+from engram.learn.steps import INPUTS, Coded, Settings, Step, StepTables, fit, steps_of
 from engram.paths import BUILD
 from engram.study.report import Report
 
@@ -28,7 +30,11 @@ THESIS = {  # learner: trajectory error (rad), contact error (m), raw and refine
     "gpr": (9.53, 0.07, 13.04, 0.04), "gmr": (12.39, 0.13, 18.51, 0.09), "knn": (18.78, 0.49, 29.93, 0.51),
 }  # fmt: skip
 NQ, NV = engine.talos.nq, engine.talos.nv
+SETTINGS = Settings()
 MIXTURE_SAMPLES, MIXTURE_COMPONENTS = 1000, 12
+FROM_WALK, INTO_WALK = 12, 13  # of the features
+VARIED = [0, 1, 2, 3, 4, 5, 14]  # features that differ among single steps
+JITTER = 1e-3  # of the mixture's inputs: the foot is 0 or 1, of which no Gaussian has a width
 
 
 @dataclass(frozen=True)
@@ -48,7 +54,12 @@ class Tested:
     def feet(self) -> np.ndarray:
         return self.x[:6].reshape(2, 3)
 
+    @property
+    def step(self) -> Step:
+        return Step(self.feet, self.x[6:], self.foot)
 
+
+@cache
 def draw_tested(count: int) -> list[Tested]:
     """Half of the left foot, half of the right."""
     problem, found = engine.TalosSteps(), []
@@ -66,60 +77,74 @@ def draw_tested(count: int) -> list[Tested]:
 # ---- learners -----------------------------------------------------------------------------------------------------------------
 
 
-def path_from(q0: np.ndarray, dq: np.ndarray) -> np.ndarray:
-    """q (T + 1, nq) = q0 (+) dq, knot 0 first."""
-    moved = engine.TalosSteps.integrate(np.repeat(q0[None], len(dq), 0), np.ascontiguousarray(dq))
-    return np.vstack([q0, moved])
+def spread(x: np.ndarray) -> np.ndarray:
+    """Standard deviations of the columns, 1 where one is constant."""
+    std = x.std(axis=0)
+    return np.where(std > 1e-9, std, 1.0)
+
+
+def shared(coded: Coded, columns: list[int] | None = None) -> dict:
+    """What all tables from features to coefficients have in common."""
+    columns = list(range(len(INPUTS))) if columns is None else columns
+    x = coded.x[:, columns]
+    return {
+        "role": "learner",
+        "inputs": [INPUTS[i] for i in columns],
+        "lo": x.min(axis=0),
+        "hi": x.max(axis=0),
+        "held_out_error": 0.0,
+        "held_out_text": "",
+    }
 
 
 class Learners:
-    """GPR, GMR and k-NN on one database, with the same bases."""
+    """GPR, GMR and k-NN on one database, with the same bases, each through the compiled evaluator of its table."""
 
-    def __init__(self, sets: list[StepData], raw: bool):
+    def __init__(self, sets: list[StepData], raw: bool, settings: Settings = SETTINGS):
         train, test = zip(*map(split, sets), strict=True)
-        self.tables: StepTables = fit(list(train), list(test), Settings(), raw)
-        self.memory = self.tables.memory()
-        self.x, self.z, self.mixtures = [], [], []
-        path, torque = self.tables.path, self.tables.torque
-        for foot, data in enumerate(train):
-            seen = mirrored(data, foot, raw)
-            parts = []
-            for table, numbers in ((path, seen.dq), (torque, seen.u)):
-                flat = numbers.reshape(len(numbers), -1) - table.mean
-                parts.append(np.linalg.lstsq(table.basis.T, flat.T, rcond=None)[0].T)
-            self.x.append(seen.x)
-            self.z.append(np.hstack(parts))
-        self.scale = 1.0 / np.std(self.x[0], axis=0)
+        self.tables: StepTables = fit(list(train), list(test), settings, raw)
+        self.memory, self.made, self.others = self.tables.memory(), {}, {}
 
-    def fit_mixtures(self) -> None:
-        """GMR takes a while: only where it is asked for."""
-        for x, z in zip(self.x, self.z, strict=True):
-            some = slice(0, MIXTURE_SAMPLES)
-            fitted = condition(fit_gaussian(x[some], z[some], MIXTURE_COMPONENTS, ridge=1e-4))
-            rest = {"inputs": INPUTS, "lo": x.min(axis=0), "hi": x.max(axis=0), "held_out_error": 0.0, "held_out_text": ""}
-            self.mixtures.append(engine.Table(mixture_table(fitted, **rest)))
+    def add(self, name: str, table: Table) -> None:
+        """Another learner of the same coefficients."""
+        self.made[name], self.others[name] = table, engine.Table(table)
 
-    def decode(self, z: np.ndarray, foot: int) -> tuple[np.ndarray, np.ndarray]:
-        dq = (self.tables.path.mean + z[: len(self.tables.path.basis)] @ self.tables.path.basis).reshape(-1, NV)
-        u = (self.tables.torque.mean + z[len(self.tables.path.basis) :] @ self.tables.torque.basis).reshape(len(dq), -1)
-        return (mirrored_dofs(dq), mirrored_controls(u)) if foot == 1 else (dq, u)
+    def add_neighbour(self) -> None:
+        """The nearest of all steps, in inputs of unit variance."""
+        if "knn" in self.made:
+            return
+        coded = self.tables.coded
+        self.add("knn", Knn(**shared(coded), x=coded.x, scale=1.0 / spread(coded.x), value=coded.z))
 
-    def gpr(self, task: Tested, x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def add_mixture(self) -> None:
+        """GMR takes a while: of some of the single steps, and only where it is asked for."""
+        if "gmr" in self.made:
+            return
+        coded = self.tables.coded
+        single = np.flatnonzero(~coded.x[:, [FROM_WALK, INTO_WALK]].any(axis=1))
+        some = single[:: max(1, len(single) // MIXTURE_SAMPLES)]
+        x = coded.x[some][:, VARIED] + JITTER * np.random.default_rng(0).standard_normal((len(some), len(VARIED)))
+        fitted = condition(fit_gaussian(x, coded.z[some], MIXTURE_COMPONENTS, ridge=1e-4))
+        self.add("gmr", mixture_table(fitted, **shared(coded, VARIED)))
+
+    def gpr(self, step: Step, x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The deployed query: xs (T + 1, nx), us (T, nu)."""
-        found = self.memory.query(task.feet, task.x[6:], task.foot, x0)
+        found = self.memory.query(*step.asked, x0, **step.within)
         return found["xs"], found["us"]
 
-    def answer(self, name: str, task: Tested, problem: engine.TalosSteps) -> tuple[np.ndarray, np.ndarray]:
+    def answer(self, name: str, step: Step, x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """xs (T + 1, nx), us (T, nu) of a learner."""
         if name == "gpr":
-            return self.gpr(task, problem.x0)
-        x = features(task.x[None], task.foot)[0]
-        if name == "knn":
-            z = self.z[task.foot][np.argmin(np.sum(((self.x[task.foot] - x) * self.scale) ** 2, axis=1))]
+            return self.gpr(step, x0)
+        x, table = step.features()[None], self.others[name]
+        if name == "gmr":
+            z = table.moments(x[:, VARIED])[0][0]
+        elif name == "knn":
+            z = table.answers(x)["y"][0, 0]
         else:
-            z = self.mixtures[task.foot].moments(x[None])[0][0]
-        dq, u = self.decode(z, task.foot)
-        return problem.along(path_from(problem.x0[:NQ], dq))["xs"], u
+            z = table.moments(x)[0][0]
+        found = self.memory.decode(np.ascontiguousarray(z), *step.asked, x0, **step.within)
+        return found["xs"], found["us"]
 
 
 # ---- counting -----------------------------------------------------------------------------------------------------------------
@@ -183,10 +208,11 @@ def figures(report: Report, name: str, count: Count) -> None:
         report.figure(f"subopt1.{name}", count.suboptimality, n=n)
 
 
+@cache
 def load_sets(quick: bool) -> list[StepData]:
     """What `engram data talos step` left, or a small set of our own."""
     if quick:
-        step_set.make(step_set.CHUNK * 24, 3, 2, BUILD / "data" / "quick")
+        step_set.make(step_set.CHUNK * 8, 3, 2, BUILD / "data" / "quick")
         return step_set.load(BUILD / "data" / "quick" / "talos_step.npz")[0]
     return step_set.load(BUILD / "data" / "talos_step.npz")[0]
 
@@ -194,18 +220,25 @@ def load_sets(quick: bool) -> list[StepData]:
 # ---- the rows -----------------------------------------------------------------------------------------------------------------
 
 
-def accuracy(report: Report, sets: list[StepData], tested: list[Tested]) -> None:
+@cache
+def learnt_from(quick: bool, raw: bool = False) -> Learners:
+    """The learners on all data; fitted once, however many rows are asked for."""
+    return Learners(load_sets(quick), raw)
+
+
+def accuracy(report: Report, quick: bool, tested: list[Tested]) -> None:
     """Table 4.1: what the learners predict beside the truth of each database."""
     problem, rows = engine.TalosSteps(), {name: [] for name in THESIS}
     for raw in (True, False):
-        learners = Learners(sets, raw)
-        learners.fit_mixtures()
+        learners = learnt_from(quick, raw)
+        learners.add_neighbour()
+        learners.add_mixture()
         for name in THESIS:
             path, contact = [], []
             for task in tested:
                 task.pose(problem)
                 truth = task.q_raw if raw else task.q
-                q = learners.answer(name, task, problem)[0][:, :NQ]
+                q = learners.answer(name, task.step, problem.x0)[0][:, :NQ]
                 path.append(np.linalg.norm(q - truth))
                 feet, _ = problem.feet(np.ascontiguousarray(q))
                 true_feet, _ = problem.feet(np.ascontiguousarray(truth))
@@ -219,21 +252,22 @@ def accuracy(report: Report, sets: list[StepData], tested: list[Tested]) -> None
         report.say(f"{name:<6}{p0:>17.4f}{c0:>13.5f}{p1:>17.4f}{c1:>13.5f}   {' / '.join(map(str, THESIS[name]))}")
 
 
-def single(report: Report, sets: list[StepData], tested: list[Tested]) -> None:
+def single(report: Report, quick: bool, tested: list[Tested]) -> None:
     """Table 4.2: warm against cold."""
     problem = engine.TalosSteps()
-    raw, refined = Learners(sets, True), Learners(sets, False)
+    raw, refined = learnt_from(quick, True), learnt_from(quick)
     for learners in (raw, refined):
-        learners.fit_mixtures()
+        learners.add_neighbour()
+        learners.add_mixture()
     methods = [
         ("cold", "cold", "98.5, 9.52", lambda task: tuple(problem.cold(False)[k] for k in ("xs", "us"))),
         ("cold, torques of stance", "cold_torques", "", lambda task: tuple(problem.cold(True)[k] for k in ("xs", "us"))),
         ("planner (stage one)", "planner", "", lambda task: tuple(problem.planned()[k] for k in ("xs", "us"))),
-        ("GPR on Hpp", "gpr_hpp", "99.0, 5.01", lambda task: raw.answer("gpr", task, problem)),
-        ("GMR on Hpp", "gmr_hpp", "100, 4.85", lambda task: raw.answer("gmr", task, problem)),
-        ("k-NN on Crl", "knn", "", lambda task: refined.answer("knn", task, problem)),
-        ("GMR on Crl", "gmr", "100, 3.06", lambda task: refined.answer("gmr", task, problem)),
-        ("GPR on Crl: the memory", "memory", "100, 3.04", lambda task: refined.answer("gpr", task, problem)),
+        ("GPR on Hpp", "gpr_hpp", "99.0, 5.01", lambda task: raw.answer("gpr", task.step, problem.x0)),
+        ("GMR on Hpp", "gmr_hpp", "100, 4.85", lambda task: raw.answer("gmr", task.step, problem.x0)),
+        ("k-NN on Crl", "knn", "", lambda task: refined.answer("knn", task.step, problem.x0)),
+        ("GMR on Crl", "gmr", "100, 3.06", lambda task: refined.answer("gmr", task.step, problem.x0)),
+        ("GPR on Crl: the memory", "memory", "100, 3.04", lambda task: refined.answer("gpr", task.step, problem.x0)),
     ]
     report.say(HEAD)
     for label, key, thesis, guess in methods:
@@ -257,20 +291,20 @@ def at_cone_of_the_walk(report: Report, refined: Learners, tested: list[Tested],
         best = problem.solve(planned["xs"], planned["us"], stop=1e-7)["cost"]
         cold = problem.cold(False)
         counts["cold"].add(problem, cold["xs"], cold["us"], best)
-        counts["memory"].add(problem, *refined.gpr(task, problem.x0), best)
+        counts["memory"].add(problem, *refined.gpr(task.step, problem.x0), best)
     report.say("wrenches outside their cone weigh 0.3, as in the walk; the memory was learnt at 0.01:")
     for name, count in counts.items():
         figures(report, f"{name}_cone_of_walk", count)
         report.say(count.line(f"{name}, cone {cone}"))
 
 
-def parts(report: Report, sets: list[StepData], tested: list[Tested]) -> None:
+def parts(report: Report, quick: bool, tested: list[Tested]) -> None:
     """Table 4.3: which part of the guess is remembered."""
-    problem, memory = engine.TalosSteps(), Learners(sets, False)
+    problem, memory = engine.TalosSteps(), learnt_from(quick)
     zero = np.zeros((problem.knots, problem.nu))
 
     def guess(kind: str, task: Tested) -> tuple[np.ndarray, np.ndarray]:
-        xs, us = memory.gpr(task, problem.x0)
+        xs, us = memory.gpr(task.step, problem.x0)
         still = np.repeat(problem.x0[None], len(xs), 0)
         if kind in ("qu0", "qid"):
             us = problem.along(np.ascontiguousarray(xs[:, :NQ]), kind == "qid")["us"]
@@ -289,42 +323,51 @@ def parts(report: Report, sets: list[StepData], tested: list[Tested]) -> None:
     report.say(LEGEND)
 
 
-def compose(memory: engine.TalosStepMemory, feet: np.ndarray, goals: np.ndarray, first: int, x0: np.ndarray) -> tuple:
-    """A walk from single steps: each begins where the one before ends, and has its own frame."""
-    now, xs, us = feet.copy(), [x0[None]], []
-    for i, goal in enumerate(goals):
-        foot = (first + i) % 2
-        found = memory.query(now, goal, foot, np.ascontiguousarray(xs[-1][-1]))
+def compose(memory: engine.TalosStepMemory, steps: list[Step], x0: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """A walk of steps that are remembered one by one, each in its own frame, from where the one before ends."""
+    xs, us = [x0[None]], []
+    for step in steps:
+        found = memory.query(*step.asked, np.ascontiguousarray(xs[-1][-1]), **step.within)
         xs.append(found["xs"][1:])
         us.append(found["us"])
-        now[foot] = goal
     return np.vstack(xs), np.vstack(us)
 
 
-def walks(report: Report, sets: list[StepData], count: int) -> None:
-    """Table 4.4: three steps composed of single ones."""
-    problem = engine.TalosSteps()
-    raw, refined = Learners(sets, True).memory, Learners(sets, False).memory
-    counts = {"cold": Count.empty(), "hpp": Count.empty(), "memory": Count.empty()}
-    for i in range(count):
-        feet, goals, first = steps.draw_walk(SEED, 3, i)
-        problem.set(feet, goals, first)
-        planned = problem.planned()
-        best = problem.solve(planned["xs"], planned["us"], stop=1e-7, iterations=200)
-        if not best["converged"]:
-            raise RuntimeError(f"the tested walk {i} has no converged solution")
-        cold = problem.cold(False)
-        counts["cold"].add(problem, cold["xs"], cold["us"], best["cost"])
-        counts["hpp"].add(problem, *compose(raw, feet, goals, first, problem.x0), best["cost"])
-        counts["memory"].add(problem, *compose(refined, feet, goals, first, problem.x0), best["cost"])
+def alone(steps: list[Step]) -> list[Step]:
+    """The same steps, each from rest to rest."""
+    return [Step(*step.asked) for step in steps]
+
+
+def walks(report: Report, quick: bool, count: int) -> None:
+    """Table 4.4: three steps composed of remembered ones, at the gait of the walk; and with a rest between them."""
+    raw, refined = learnt_from(quick, True).memory, learnt_from(quick).memory
+    rest = engine.TalosSteps.knots - engine.TalosSteps.swing
+    labels = {
+        "cold": "100, 6.17", "hpp": "100, 6.40", "memory": "100, 4.54",
+        "cold_with_rests": "", "memory_with_rests": "",
+    }  # fmt: skip
+    counts = {key: Count.empty() for key in labels}
+    for between, suffix, part in ((engine.TalosSteps.between, "", list), (rest, "_with_rests", alone)):
+        problem = engine.TalosSteps(between=between)
+        for i in range(count):
+            feet, goals, first = steps.draw_walk(SEED, i)
+            problem.set(feet, goals, first)
+            planned = problem.planned()
+            best = problem.solve(planned["xs"], planned["us"], stop=1e-7, iterations=200)
+            if not best["converged"]:
+                raise RuntimeError(f"the tested walk {i} has no converged solution")
+            cold, asked = problem.cold(False), part(steps_of(feet, goals, first))
+            counts[f"cold{suffix}"].add(problem, cold["xs"], cold["us"], best["cost"])
+            counts[f"memory{suffix}"].add(problem, *compose(refined, asked, problem.x0), best["cost"])
+            if not suffix:
+                counts["hpp"].add(problem, *compose(raw, asked, problem.x0), best["cost"])
     report.say(HEAD)
-    for label, key, thesis in (
-        ("cold", "cold", "100, 6.17"),
-        ("GPR on Hpp", "hpp", "100, 6.40"),
-        ("GPR on Crl: the memory", "memory", "100, 4.54"),
-    ):
+    for key, thesis in labels.items():
         figures(report, key, counts[key])
-        report.say(counts[key].line(label, thesis))
+        report.say(counts[key].line(key, thesis))
+    report.say(
+        f"with_rests: {rest} knots on both feet between two swings, not {engine.TalosSteps.between}; steps from rest to rest"
+    )
     report.say(LEGEND)
 
 
@@ -342,7 +385,7 @@ def run(row: str, quick: bool) -> None:
     sets, count = load_sets(quick), 20 if quick else TESTED
     report.say(f"{sum(map(len, sets))} steps in the database, {count} tested")
     if row == "3.4":
-        walks(report, sets, count)
+        walks(report, quick, count)
     else:
-        {"3.1": accuracy, "3.2": single, "3.3": parts}[row](report, sets, draw_tested(count))
+        {"3.1": accuracy, "3.2": single, "3.3": parts}[row](report, quick, draw_tested(count))
     report.close()
