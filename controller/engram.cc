@@ -4,6 +4,7 @@
 #include "controller/loop/loop_door.h"
 #include "controller/loop/loop_fpu.h"
 
+#include <cmath>
 #include <cstring>
 
 using engram::FlushSubnormals;
@@ -137,6 +138,12 @@ engram_status engram_feedback(engram_controller* handle, int64_t utime, const do
 engram_status engram_command(engram_controller* handle, int64_t utime, const double* q, const double* v, double* tau) {
   const FlushSubnormals flush;
   return handle->model->command(handle, utime, q, v, tau);
+}
+
+int32_t engram_choose_goal(engram_controller* handle, const double* q, const double* v, const double* goals, int32_t n, double* merit) {
+  const FlushSubnormals flush;
+  for (int32_t g = 0; g < n; ++g) merit[g] = HUGE_VAL;
+  return handle->model->choose_goal != nullptr ? handle->model->choose_goal(handle, q, v, goals, n, merit) : -1;
 }
 
 void engram_cycle_info(const engram_controller* handle, engram_cycle* cycle) { *cycle = handle->model->cycle(handle); }

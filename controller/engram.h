@@ -201,6 +201,13 @@ engram_status engram_feedback(engram_controller* handle, int64_t utime, const do
 // On the lower rungs the law of that rung. `tau` (nu) in N m (or N) is always finite, whatever the state.
 engram_status engram_command(engram_controller* handle, int64_t utime, const double* q, const double* v, double* tau);
 
+// The memory as a metric: of n goals (n rows of ntask, as engram_set_task takes them), the one to which the memory holds the cheapest
+// motion from the state q (nq), v (nv); nothing is solved. Its index, the first among equals.
+// merit (n) out: of the best guess for each goal, as engram_cycle.merit; +infinity without one, and for a goal that is not finite or
+// outside the range of the memory. -1: no goal has a guess, the state is not finite, or this model has no such memory.
+// For the planner thread, between engram_feedback and engram_prepare (else -1). One query of the memory for each goal.
+int32_t engram_choose_goal(engram_controller* handle, const double* q, const double* v, const double* goals, int32_t n, double* merit);
+
 // ---- what happened ----
 
 // Where feet and centre of mass of a robot on legs are asked to be, at the cycle's utime. World axes.

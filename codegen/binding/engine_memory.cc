@@ -97,13 +97,14 @@ template <class Task> class Memory {
     std::vector<ReachTarget> goals(n);
     for (std::size_t i = 0; i < n; ++i)
       if (!reach_target(tasks.data() + i * Task::ntask, goals[i])) throw nb::value_error("tasks: not finite, or a zero quaternion");
-    const auto choice = std::make_unique<GoalChoice<Model, kMemoryGuesses>>();
-    const auto ask = [&](const ReachTarget& goal, const double* t, Candidate<typename Model::P>* candidates) {
+    const auto horizon = std::make_unique<Horizon<typename Model::P, N>>();
+    Candidate<typename Model::P> candidates[kMemoryGuesses];
+    const auto ask = [&](const ReachTarget& goal, const double* t, Candidate<typename Model::P>* found) {
       memory_query<Task>(tables_, tables_.ensemble, goal, x0.data(), N, t, *work_, *answer_);
-      return reach_candidates(*answer_, candidates, 0);
+      return reach_candidates(*answer_, found, 0);
     };
     NewArray merit({n});
-    const int best = loop_choose_goal<Model>(goals.data(), int(n), x0.data(), ask, merit.data(), *choice);
+    const int best = loop_choose_goal<Model>(goals.data(), int(n), x0.data(), ask, merit.data(), *horizon, candidates);
     return nb::make_tuple(best, merit.release());
   }
 

@@ -23,6 +23,16 @@ template <class M, class PlannerOfM> struct LoopController : engram_controller {
   PlannerOfM planner;
 };
 
+// The planner's choice among goals, if it has one.
+template <class C, class PlannerOfM, class = void> struct GoalChooser {
+  static constexpr int32_t (*kCall)(engram_controller*, const double*, const double*, const double*, int32_t, double*) = nullptr;
+};
+template <class C, class PlannerOfM> struct GoalChooser<C, PlannerOfM, std::void_t<decltype(&PlannerOfM::choose_goal)>> {
+  static int32_t kCall(engram_controller* c, const double* q, const double* v, const double* goals, int32_t n, double* merit) {
+    return static_cast<C*>(c)->planner.choose_goal(q, v, goals, n, merit);
+  }
+};
+
 // The model of M. `constexpr` where it is defined, so that it lies in read-only memory.
 template <class M, class PlannerOfM> constexpr engram_model loop_model(const char* robot, const char* task) {
   using C = LoopController<M, PlannerOfM>;
@@ -50,6 +60,7 @@ template <class M, class PlannerOfM> constexpr engram_model loop_model(const cha
       [](const engram_controller* c, int64_t* utime, double* x, double* u, double* K) {
         return copy_plan(static_cast<const C*>(c)->planner.plan(), utime, x, u, K);
       },
+      GoalChooser<C, PlannerOfM>::kCall,
   };
 }
 

@@ -24,6 +24,7 @@ struct engram_model {
   const engram_cycle& (*cycle)(const engram_controller*);
   const engram_jump& (*jump)(const engram_controller*);
   int32_t (*plan)(const engram_controller*, int64_t*, double*, double*, double*);
+  int32_t (*choose_goal)(engram_controller*, const double*, const double*, const double*, int32_t, double*);  // NULL: it cannot
 };
 
 #endif  // CONTROLLER_LOOP_LOOP_DOOR_H_

@@ -2,6 +2,7 @@
 #ifndef CONTROLLER_LOOP_LOOP_GUESSES_H_
 #define CONTROLLER_LOOP_LOOP_GUESSES_H_
 
+#include "controller/loop/loop_goals.h"
 #include "controller/loop/loop_merit.h"
 #include "controller/loop/loop_plan.h"
 
@@ -40,6 +41,17 @@ template <class M> class Guesses {
     double t[N + 1];
     for (int k = 0; k <= N; ++k) t[k] = 1e-6 * static_cast<double>(utime[k] - utime[0]);
     n = memory_.guesses(target, question, x0, N, t, candidate, n);
+  }
+  // The memory as a metric: merit of its best guess from x0 for one goal, +infinity without one. The candidates are lost.
+  double merit_of(const typename M::Target& goal, const double* x0, Horizon<P, N>& scratch) {
+    double us[ENGRAM_CANDIDATE_COUNT], merit;
+    loop_choose_goal<M>(
+        &goal, 1, x0,
+        [&](const typename M::Target& target, const double* t, Candidate<P>* found) {
+          return memory_.guesses(target, {true, 0, nullptr, us}, x0, N, t, found, 0);
+        },
+        &merit, scratch, candidate);
+    return merit;
   }
   void compare(const Horizon<P, N>& horizon) { loop_merit(horizon, candidate, n); }
 

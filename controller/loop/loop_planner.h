@@ -32,6 +32,7 @@ template <class M> class Planner : public PlannerCore<M, Planner<M>> {
 
   engram_status prepare(int64_t utime);
   engram_status roll(int64_t utime);
+  int choose_goal(const double* q, const double* v, const double* goals, int n, double* merit);
 
  private:
   using typename Core::Trial;
@@ -166,6 +167,23 @@ template <class M> engram_status Planner<M>::prepare(int64_t utime) {
   jumped_ = false;
   cycle_.total_us = deadline.spent();
   return ending_;
+}
+
+// The goal (n, ntask) with the cheapest guess from q, v. Scratch is what the next period fills anew: not while one is prepared.
+template <class M> int Planner<M>::choose_goal(const double* q, const double* v, const double* goals, int n, double* merit) {
+  double x0[nx];
+  std::memcpy(x0, q, sizeof(double) * nq);
+  std::memcpy(x0 + nq, v, sizeof(double) * (nx - nq));
+  const bool able = !prepared_ && all_finite(x0, nx);
+  int best = -1;
+  for (int g = 0; g < n; ++g) {
+    const double* const value = goals + g * M::ntask;
+    typename M::Target target;
+    const bool known = able && all_finite(value, M::ntask) && M::target(value, target) && M::known(value);
+    merit[g] = known ? guesses_.merit_of(target, x0, solve_.horizon) : HUGE_VAL;
+    if (merit[g] < (best < 0 ? HUGE_VAL : merit[best])) best = g;
+  }
+  return best;
 }
 
 // May the new plan be executed? The status says what stands against it.

@@ -21,8 +21,9 @@ struct GoalsTest : testing::Test {
   double x0[P::nx] = {};
   ReachTarget goal[3];
   Seed<P, N> still, elsewhere;
-  GoalChoice<Model, kGuesses> choice;
-  double merit[3];
+  Horizon<P, N> horizon;
+  Candidate<P> scratch[kGuesses];
+  double merit[3], last_t[N + 1];
 
   // Goals 30, 0 and 60 cm above the hand.
   GoalsTest() {
@@ -39,12 +40,13 @@ struct GoalsTest : testing::Test {
     for (auto& x : elsewhere.x) x[0] += 0.5;
   }
   // For every goal: standing still, and a worse guess before it.
-  int ask(const ReachTarget&, const double*, Candidate<P>* candidates) {
+  int ask(const ReachTarget&, const double* t, Candidate<P>* candidates) {
+    std::memcpy(last_t, t, sizeof last_t);
     candidates[0] = {ENGRAM_CANDIDATE_KNN, elsewhere.x, elsewhere.u, 0, 0, 0};
     candidates[1] = {ENGRAM_CANDIDATE_COLD, still.x, still.u, 0, 0, 0};
     return 2;
   }
-  template <class Ask> int choose(int n, Ask ask) { return loop_choose_goal<Model>(goal, n, x0, ask, merit, choice); }
+  template <class Ask> int choose(int n, Ask ask) { return loop_choose_goal<Model>(goal, n, x0, ask, merit, horizon, scratch); }
 };
 
 TEST_F(GoalsTest, TheNearestGoalIsTheCheapestForWhoStandsStill) {
@@ -52,8 +54,8 @@ TEST_F(GoalsTest, TheNearestGoalIsTheCheapestForWhoStandsStill) {
   EXPECT_EQ(choose(3, all), 1);
   EXPECT_LT(merit[1], merit[0]);
   EXPECT_LT(merit[0], merit[2]);
-  EXPECT_EQ(choice.t[0], 0);
-  EXPECT_DOUBLE_EQ(choice.t[N], N * Task::dt);
+  EXPECT_EQ(last_t[0], 0);
+  EXPECT_DOUBLE_EQ(last_t[N], N * Task::dt);
   EXPECT_EQ(choose(1, all), 0);
 }
 
