@@ -5,8 +5,9 @@
 // A motion: the hand is brought to a random point on one side of the pole by a guide that knows the way round (`Guide`), then the target goes
 // to a random point on the other side, at once or along a straight line at up to kSpeed, and the controller is on its own for kAlone seconds.
 // Success: the robot stands, the arm never touched the pole, and the hand is within the task's success_position over the last kRest seconds.
-// With `guide=1` the guide leads in both parts: the runs from which the memory learns. record=FILE: one row of doubles per control period
-// of the second part (native byte order): motion, s since the target went, q, v, target (see codegen/engram/learn/pole.py).
+// With `guide=1` the guide leads in both parts, after up to kStray seconds in which the hand may get stuck: the runs from which the memory
+// learns. record=FILE: one row of doubles per control period of the second part of a motion that succeeds (native byte order): motion,
+// s since the guide took over, q, v, target (see codegen/engram/learn/pole.py).
 // first=N: motions N, N + 1, ... of the seed's; cycles=FILE: two doubles per control period of the second part, CPU time of the whole and
 // of the memory's answer [us].
 #include <algorithm>
@@ -32,10 +33,12 @@ using Task = engram::tasks::TalosPole;
 
 constexpr double kSettle = 4.0, kAlone = 4.0, kRest = 0.3;  // s, most time to get to the first point; s; s
 constexpr double kSpeed = 0.8;                              // m/s, slowest of a target that moves half of it
+constexpr double kStray = 1.2;                              // s, longest that a guided hand goes on its own before the guide leads
 
 struct Motion {
   double from[3], to[3];  // m, world
   double speed;           // m/s; 0: the target jumps
+  int64_t stray;          // us, of a guided run: so long the hand goes on its own first, and may get stuck
 };
 
 // uniform in [lo, hi], the same numbers on every machine
@@ -48,16 +51,28 @@ void draw(std::mt19937_64& rng, int side, double (&p)[3]) {
   p[2] = uniform(rng, 0.95, 1.2);
 }
 
-Motion draw(std::mt19937_64& rng) {
+Motion draw(std::mt19937_64& rng, std::mt19937_64& astray) {
   Motion m;
   const int side = rng() & 1 ? 1 : -1;
   draw(rng, side, m.from);
   draw(rng, -side, m.to);
   m.speed = rng() & 1 ? uniform(rng, 0.5 * kSpeed, kSpeed) : 0.0;
+  m.stray = 10000 * std::max(int64_t{0}, static_cast<int64_t>(100.0 * uniform(astray, -0.5 * kStray, kStray)));  // whole ticks
   return m;
 }
 
 double distance(const double* a, const double* b) { return std::sqrt((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1]) + (a[2] - b[2]) * (a[2] - b[2])); }
+
+// How far the joint that is farthest beyond its limits is [rad].
+double excess(const LeggedPlant& plant) {
+  double most = 0.0;
+  for (int j = 0; j < plant.model()->njnt; ++j) {
+    if (!plant.model()->jnt_limited[j]) continue;
+    const double q = plant.data()->qpos[plant.model()->jnt_qposadr[j]];
+    most = std::max({most, plant.model()->jnt_range[2 * j] - q, q - plant.model()->jnt_range[2 * j + 1]});
+  }
+  return most;
+}
 
 bool touches(const LeggedPlant& plant, int pole) {
   for (int i = 0; i < plant.data()->ncon; ++i) {
@@ -98,11 +113,11 @@ int main(int argc, char** argv) {
   };
   std::FILE *const log = open(record), *const clocked = open(times);
 
-  std::mt19937_64 rng(seed);
+  std::mt19937_64 rng(seed), astray(~seed);
   std::vector<double> cycles, queries;
   int successes = 0, done = 0;
   for (int n = 0; n < first + motions; ++n) {
-    const Motion m = draw(rng);
+    const Motion m = draw(rng, astray);
     if (n < first) continue;
     LeggedPlant plant(kModel, 0.0);
     LeggedController controller(kModel, &options);
@@ -136,30 +151,34 @@ int main(int argc, char** argv) {
     }
     const bool ready = settled();
     // on its own
+    const double way = distance(m.from, m.to);
+    const auto target = [&](double t, double (&p)[3]) {  // t seconds after it set out
+      const double s = m.speed == 0.0 ? 1.0 : std::min(1.0, t * m.speed / way);
+      for (int i = 0; i < 3; ++i) p[i] = m.from[i] + s * (m.to[i] - m.from[i]);
+    };
+    double p[3];
+    for (int64_t begin = plant.utime; guided && ready && plant.utime < begin + m.stray && !fallen; step()) {
+      target(1e-6 * static_cast<double>(plant.utime - begin), p);
+      if (plant.utime % 10000 == 0) ask(p, plant.utime == begin);
+    }
     guide.begin();
     const int64_t start = plant.utime;
-    const double way = distance(m.from, m.to);
-    double worst = 0.0;
+    std::vector<double> rows;
+    double worst = 0.0, over = 0.0;
     int remembered = 0;  // cycles that the memory has won
     while (ready && plant.utime < start + static_cast<int64_t>(1e6 * kAlone) && !fallen) {
       const double t = 1e-6 * static_cast<double>(plant.utime - start);
       if (plant.utime % 10000 == 0) {
         if (guided) {
           lead(m.to);
-        } else if (m.speed == 0.0 || t * m.speed >= way) {
-          if (t == 0.0 || m.speed > 0.0) ask(m.to, t == 0.0);
         } else {
-          double p[3];
-          for (int i = 0; i < 3; ++i) p[i] = m.from[i] + t * m.speed / way * (m.to[i] - m.from[i]);
-          ask(p, t == 0.0);  // those within the pole are refused: the last one stays
+          target(t, p);
+          if (t == 0.0 || m.speed > 0.0) ask(p, t == 0.0);  // those within the pole are refused: the last one stays
         }
-        if (log != nullptr) {
-          std::vector<double> row = {double(n), t};
-          row.insert(row.end(), plant.q.begin(), plant.q.end());
-          row.insert(row.end(), plant.v.begin(), plant.v.end());
-          row.insert(row.end(), m.to, m.to + 3);
-          std::fwrite(row.data(), sizeof(double), row.size(), log);
-        }
+        rows.insert(rows.end(), {double(n), t});
+        rows.insert(rows.end(), plant.q.begin(), plant.q.end());
+        rows.insert(rows.end(), plant.v.begin(), plant.v.end());
+        rows.insert(rows.end(), m.to, m.to + 3);
       }
       const bool ticked = plant.utime % 10000 == 0;
       step();
@@ -171,13 +190,15 @@ int main(int argc, char** argv) {
         if (clocked != nullptr) std::fwrite(row, sizeof row, 1, clocked);
       }
       touched = touched || touches(plant, pole);
+      over = std::max(over, excess(plant));
       if (t > kAlone - kRest) worst = std::max(worst, distance(hand, m.to));
     }
     const bool success = ready && !fallen && !touched && worst < Task::success_position;
+    if (success && log != nullptr) std::fwrite(rows.data(), sizeof(double), rows.size(), log);
     successes += success ? 1 : 0;
     ++done;
-    std::printf("motion %d side %d speed %.2f ready %d success %d error_m %.4f touched %d fallen %d refused %d remembered %d hand %.3f %.3f %.3f\n", n,
-                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, worst, touched, fallen, refused, remembered, hand[0], hand[1], hand[2]);
+    std::printf("motion %d side %d speed %.2f ready %d success %d error_m %.4f touched %d over_mrad %.2f fallen %d refused %d remembered %d hand %.3f %.3f %.3f\n", n,
+                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, worst, touched, 1e3 * over, fallen, refused, remembered, hand[0], hand[1], hand[2]);
     std::fflush(stdout);
   }
   if (log != nullptr) std::fclose(log);

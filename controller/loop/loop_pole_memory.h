@@ -26,7 +26,7 @@ inline constexpr int kPoleMaxPath = 512;   // numbers of a path
 template <class C, class P, const PoleTables& tables> class PoleMemory {
  public:
   static constexpr bool kRemembers = true;
-  static constexpr int kIterations = 3, kPatience = 6, kWays = 3;  // of a rival (loop_rival.h); neighbours offered in turn
+  static constexpr int kIterations = 3, kPatience = 10, kWays = 3;  // of a rival (loop_rival.h); neighbours offered in turn
   static constexpr int nq = P::nq, nv = P::nv, nu = P::nu, nmoved = C::nmoved;
 
   static bool tables_fit() {

@@ -3,7 +3,8 @@
 // A plan that has come to rest before an obstacle stays there: its shift is a local minimum, and an iteration leaves it where it is. A rival
 // starts elsewhere. It has M::Memory::kIterations iterations of each tick for M::Memory::kPatience ticks, its trajectory shifted in between
 // as the plan's is; then the memory is asked anew. It takes the plan's place as soon as its merit (cost + kMeritWeight * gaps) is below the
-// shifted plan's by engram_options::switch_gain, and never otherwise. A memory has
+// shifted plan's, and never otherwise. No switch_gain: waiting for a tenth less let a stuck arm push on into what it was stuck at.
+// A memory has
 //
 //   static constexpr bool kRemembers;  static constexpr int kIterations, kPatience;
 //   bool guess(target, seq, const Plan& shifted, Seed&)   a trajectory on the shifted plan's knot times and from its state; false: none.

@@ -36,6 +36,7 @@ struct TalosPole : TalosBody<tasks::TalosPole, 50> {
     k.limit_w_u = terminal ? 0.0 : weight * Task::reach_limit_u;
     k.obstacle_w = weight * Task::reach_obstacle;
     k.obstacle_margin = Task::reach_margin;
+    k.limit_margin_q = Task::reach_limit_margin;
   }
   // Where the hand is [m], and how it moves [m/s]: world axes.
   static void hand(const double* x, double (&p)[3]) {

@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct TalosPole {
   using Robot = robots::Talos;
   static constexpr char name[] = "talos_pole";
-  static constexpr uint64_t digest = 0x802187751facca43;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x7f25b23a7047ee81;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 3;
@@ -41,16 +41,17 @@ struct TalosPole {
   static constexpr double weights_torque = 0x1.0624dd2f1a9fcp-10;  // 0.001
   static constexpr double weights_torque_scale = 0x1.9p+6;  // 100
   static constexpr double weights_cone = 0x1.4p+3;  // 10
-  static constexpr double weights_limit_q = 0x1.f4p+9;  // 1000
+  static constexpr double weights_limit_q = 0x1.388p+13;  // 10000
   static constexpr double weights_terminal = 0x1p+0;  // 1
   static constexpr double weights_terminal_velocity = 0x1p+0;  // 1
   static constexpr double reach_hand = 0x1.f4p+10;  // 2000
   static constexpr double reach_terminal = 0x1p+2;  // 4
   static constexpr double reach_near = 0x1.3333333333333p-3;  // 0.15
+  static constexpr double reach_limit_margin = 0x1.47ae147ae147bp-5;  // 0.04
   static constexpr double reach_limit_v = 0x1.9p+6;  // 100
   static constexpr double reach_limit_u = 0x1.999999999999ap-4;  // 0.1
   static constexpr double reach_obstacle = 0x1.24f8p+18;  // 300000
-  static constexpr double reach_margin = 0x1.999999999999ap-5;  // 0.05
+  static constexpr double reach_margin = 0x1.eb851eb851eb8p-5;  // 0.06
   static constexpr double reach_clearance = 0x1.eb851eb851eb8p-4;  // 0.12
   static constexpr double success_position = 0x1.eb851eb851eb8p-6;  // 0.03
   static constexpr double sole_half[2] = {0x1.70a3d70a3d70ap-4, 0x1.999999999999ap-5};  // 0.09, 0.05

@@ -5,6 +5,7 @@
 #include "controller/ocp/ocp_com.h"
 #include "controller/ocp/ocp_contact.h"
 #include "controller/ocp/ocp_frame.h"
+#include "controller/ocp/ocp_frame_reach.h"
 #include "controller/ocp/ocp_motion_residuals.h"
 #include "controller/ocp/ocp_regularization.h"
 #include "controller/ocp/ocp_zmp.h"
@@ -36,7 +37,7 @@ using Momentum = ResidualTerm<CentroidalMomentum<R>>;
 template <class C, class... More>
 using Everything = ContactOcp<C, Velocity<Axes::kLocal>, Velocity<Axes::kWorld>, Velocity<Axes::kLocalWorldAligned>, VelocityBounds, Rotation,
                               Momentum, StateBoundTerm<R>, ContactForceTerm<C, 0>, ContactForceTerm<C, 1>, CopTerm<0>, WrenchConeTerm<0>,
-                              FrictionConeTerm<1>, ComTerm<R>, FramePlacementTerm<R, R::kRfFoot>, More...>;
+                              FrictionConeTerm<1>, ComTerm<R>, FramePlacementTerm<R, R::kRfFoot>, FrameReachTerm<R, R::kRfFoot>, More...>;
 
 template <Axes axes> struct ProblemOf {
   using type = Everything<Feet<axes>>;
@@ -73,6 +74,7 @@ template <class P> struct Oracle {
     put("friction_cone", param_of<FrictionConeTerm<1>>(knot));
     put("com", param_of<ComTerm<R>>(knot));
     put("placement", param_of<FramePlacementTerm<R, R::kRfFoot>>(knot));
+    put("reach", param_of<FrameReachTerm<R, R::kRfFoot>>(knot));
     put("contacts", knot.contact_ref);
     if constexpr (kContactAxes<C> == Axes::kLocalWorldAligned) put("zmp", param_of<ZmpTerm<C>>(knot));
     return done || term.empty();
@@ -115,6 +117,7 @@ template <class P> struct Oracle {
     Knot knot = {};
     std::copy_n(R::q_home, P::nq, param_of<StateBoundTerm<R>>(knot).bound_ref);  // rotations that are some, for terms that weigh nothing
     for (int i = 0; i < 9; i += 4) param_of<Rotation>(knot).ref.R_WF[i] = param_of<FramePlacementTerm<R, R::kRfFoot>>(knot).placement_R[i] = 1.0;
+    param_of<FrameReachTerm<R, R::kRfFoot>>(knot).reach_near = 1.0;
     knot.dt = phase & kImpact ? 0.0 : 1.0;
     std::string left = terms;
     for (; !left.empty(); values += *n++) {

@@ -273,18 +273,40 @@ def differences(oracle, axes, terms, phase, x, u, of) -> np.ndarray:
     return np.array(columns).T
 
 
-ZMP = {"zmp": np.array([2.0, 1.5, 0.4, -0.3, 0.02])}  # weights, reference, height
+# Terms that Crocoddyl has not.
+OWN = {
+    "zmp": np.array([2.0, 1.5, 0.4, -0.3, 0.02]),  # weights, reference, height
+    "reach": np.array([20.0, 0.15, 1.0, -0.6, 0.4]),  # weight, near, target: far beyond `near`, where the pull is bounded
+    "reach_near": np.array([20.0, 2.0, 0.35, -0.2, 0.05]),
+}
 
 
-@pytest.mark.parametrize("term, axes", [(t, "aligned") for t in [*TERMS, "zmp"]] + [(t, "local") for t in ON_FORCES])
+@pytest.mark.parametrize("term, axes", [(t, "aligned") for t in [*TERMS, *OWN]] + [(t, "local") for t in ON_FORCES])
 def test_gradients_are_those_of_differences(oracle, term, axes):
-    terms = ZMP if term == "zmp" else {term: TERMS[term][0]}
+    terms = {term.removesuffix("_near"): OWN[term] if term in OWN else TERMS[term][0]}
     for seed, phase in enumerate([BOTH, IMPACT | SOLE, IMPACT | POINT]):
         x, u = random_state(seed)
         knot = oracle(axes, terms, phase, x, u)
         gradient = differences(oracle, axes, terms, phase, x, u, lambda k: k.cost)[0]
         n = 2 * nv if phase & IMPACT else nz
         close(knot.Lz[:n], gradient[:n], DIFFERENCE)
+
+
+@pytest.mark.parametrize("term", ["reach", "reach_near"])
+def test_a_reaching_frame_pulls_with_a_bounded_force(oracle, term):
+    """Pseudo-Huber of the distance, whatever it is; its Hessian is w / s J'J: the placement term's, weakened by the stretch s."""
+    x, u = random_state(2)
+    w, near, *target = OWN[term]
+    knot = oracle("aligned", {"reach": OWN[term]}, BOTH, x, u)
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, x[:nq])
+    J = pin.computeFrameJacobian(model, data, x[:nq], frame["RF"], pin.LOCAL_WORLD_ALIGNED)[:3]
+    r = data.oMf[frame["RF"]].translation - target
+    s = np.sqrt(1.0 + r @ r / near**2)
+    close(knot.cost, w * near**2 * (s - 1.0))
+    close(knot.Lz[:nv], w / s * J.T @ r)
+    close(knot.Lzz[:nv, :nv], w / s * J.T @ J)
+    assert np.linalg.norm(w / s * r) < w * near
 
 
 @pytest.mark.parametrize("axes", ["local", "aligned"])
@@ -308,15 +330,15 @@ def test_zmp_is_where_the_ground_pushes(oracle):
     pin.rnea(model, data, x[:nq], x[nq:], knot.next[nq:] - x[nq:])
     pin.forwardKinematics(model, data, x[:nq])
     wrench = data.oMi[1].act(data.f[1])  # what the base would have to be pushed with, the ground gives
-    height = ZMP["zmp"][4]
+    height = OWN["zmp"][4]
     moment = wrench.angular - np.cross([0.0, 0.0, height], wrench.linear)
     zmp = np.array([-moment[1], moment[0]]) / wrench.linear[2]
     for i in range(2):
         w = np.zeros(2)
         w[i] = 2.0
-        terms = {"zmp": np.r_[w, ZMP["zmp"][2:]]}
+        terms = {"zmp": np.r_[w, OWN["zmp"][2:]]}
         knot = oracle("aligned", terms, BOTH, x, u)
-        e = zmp[i] - ZMP["zmp"][2 + i]
+        e = zmp[i] - OWN["zmp"][2 + i]
         close(knot.cost, e * e)
         J = differences(oracle, "aligned", terms, BOTH, x, u, lambda k: np.sqrt(k.cost))[0] * np.sign(e)
         close(knot.Lzz, 2.0 * np.outer(J, J), DIFFERENCE)
@@ -361,7 +383,7 @@ def zmp_of(x: np.ndarray, forces: list[tuple[str, np.ndarray]], height: float) -
 @pytest.mark.parametrize("phase", [SOLE, POINT, BOTH], ids=["sole", "point", "both"])
 def test_zmp_is_that_of_pinocchios_forces(oracle, phase):
     """Cost, gradient and Gauss-Newton Hessian from forces that are not ours; slopes by differences of these."""
-    w, ref, height = np.split(ZMP["zmp"], [2, 4])
+    w, ref, height = np.split(OWN["zmp"], [2, 4])
     solve, tried = pinocchios_contacts(phase), 0
     for seed in range(16):
         x, u = random_state(seed)
@@ -370,7 +392,7 @@ def test_zmp_is_that_of_pinocchios_forces(oracle, phase):
             continue
         tried += 1
         e = zmp - ref
-        knot = oracle("aligned", ZMP, phase, x, u)
+        knot = oracle("aligned", {"zmp": OWN["zmp"]}, phase, x, u)
         close(knot.cost, 0.5 * e @ (w * e))
         sides = [[moved(x, u, i, h) for h in (STEP, -STEP)] for i in range(nz)]
         points = [[zmp_of(y, solve(y, v)[1], height[0])[0] for y, v in pair] for pair in sides]

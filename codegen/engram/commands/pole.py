@@ -6,10 +6,10 @@ from pathlib import Path
 
 from engram.paths import BUILD, TABLES, relative
 
-RUNS, SEED = 100, 101
+RUNS, SEED = 110, 101
 
 EXAMPLES = """examples:
-  engram pole                      100 guided runs, tables/talos_pole/*.c, *.S, *.bin, tables.h, MANIFEST.json
+  engram pole                      110 guided runs, tables/talos_pole/*.c, *.S, *.bin, tables.h, MANIFEST.json
   engram pole --runs 20 --out /tmp/tables
   engram pole --recording runs.bin       learn from runs that were recorded before
 A change of models/talos/pole/ asks for new tables: engram task talos pole, build, engram pole, build. docs/pole.md

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
 import subprocess
-import tempfile
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,10 +14,11 @@ from engram.paths import BUILD, relative
 from engram.study.report import Report, wilson
 
 MOTIONS, QUICK = 200, 20
-SEED = 1
+BESIDE = 40  # of them also without memory
+SEED = 2026  # neither that of the recording nor one that weights were tuned on
 MODES = {"memory": "with memory", "shift": "shifted plan only", "cold": "cold at the jump"}
 SHARD = 10  # motions of one process
-WORKERS = 2
+JOINT_SLACK = 1.0  # mrad that a joint may pass its limit by, as in the demo
 AIM = {"success": 0.98, "p50": 5000.0, "p99": 10000.0}  # issue 5
 
 
@@ -35,24 +35,27 @@ class Outcome:
 
 
 def run(row: str, quick: bool) -> None:
-    """The same random motions in three modes."""
+    """The same random motions in three modes, a shard of each in turn."""
     report = Report(row, "Talos' hand follows a target to the other side of a pole (thesis, 8.1)")
     count = QUICK if quick else MOTIONS
     report.say(f"{count} motions, seed {SEED}; half of the targets jump, half move at 0.4 to 0.8 m/s; 4 s each, then within 3 cm")
-    for mode, name in MODES.items():
-        outcome = run_mode(mode, count)
-        success, (low, high) = outcome.share("success"), wilson(outcome.share("success"), count)
+    report.say(f"shifted plan and cold on the first {min(count, BESIDE)} of them")
+    for mode, outcome in run_modes(report, count).items():
+        many = len(outcome.rows)
+        success, (low, high) = outcome.share("success"), wilson(outcome.share("success"), many)
         stuck = float(
             np.mean([r["ready"] > 0 and not r["success"] and not r["fallen"] and r["error_m"] >= 0.03 for r in outcome.rows])
         )
-        text = f"success {100 * success:5.1f} % ({100 * low:.0f} to {100 * high:.0f})"
+        beyond = float(np.mean([r["over_mrad"] > JOINT_SLACK for r in outcome.rows]))
         report.say(
-            f"{name:18} {text}  stops elsewhere {100 * stuck:.1f} %  touches the pole {100 * outcome.share('touched'):.1f} %  "
-            f"falls {100 * outcome.share('fallen'):.1f} %"
+            f"{MODES[mode]:18} success {100 * success:5.1f} % ({100 * low:.0f} to {100 * high:.0f}) of {many}  "
+            f"stops elsewhere {100 * stuck:.1f} %  touches the pole {100 * outcome.share('touched'):.1f} %  "
+            f"falls {100 * outcome.share('fallen'):.1f} %  a joint beyond its limit {100 * beyond:.1f} %"
         )
-        report.figure(f"success.{mode}", success, "1", count, low=low, high=high)
-        report.figure(f"stuck.{mode}", stuck, "1", count)
-        report.figure(f"fallen.{mode}", outcome.share("fallen"), "1", count)
+        report.figure(f"success.{mode}", success, "1", many, low=low, high=high)
+        report.figure(f"stuck.{mode}", stuck, "1", many)
+        report.figure(f"touched.{mode}", outcome.share("touched"), "1", many)
+        report.figure(f"fallen.{mode}", outcome.share("fallen"), "1", many)
         if mode == "memory":
             say_times(report, outcome)
     report.say("thesis: 100 Hz; without memory the hand stops in front of the pole")
@@ -74,29 +77,38 @@ def say_times(report: Report, outcome: Outcome) -> None:
     report.figure("query_us.p99", query, "us", len(answered))
 
 
-def run_mode(mode: str, count: int) -> Outcome:
-    """Runs engram-pole on `count` motions, in shards. Raises InputError."""
+def run_modes(report: Report, count: int) -> dict[str, Outcome]:
+    """Runs `count` motions in shards, kept in build/study/7.1/: what is there is not run again. Raises InputError."""
     program = BUILD / "bin" / "engram-pole"
     if not program.is_file():
         raise InputError(f"no {relative(program)}; build it: TARGETS=engram-pole scripts/setup.sh")
-    rows, times = [], []
-    with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(WORKERS) as pool:
+    folder = BUILD / "study" / "7.1" / hashlib.sha256(program.read_bytes()).hexdigest()[:12]
+    folder.mkdir(parents=True, exist_ok=True)
+    rows: dict[str, list] = {mode: [] for mode in MODES}
+    times: dict[str, list] = {mode: [] for mode in MODES}
+    for first in range(0, count, SHARD):
+        for mode in MODES:
+            if mode != "memory" and first >= BESIDE:
+                continue
+            text, path = shard(program, folder, mode, first, min(SHARD, count - first))
+            rows[mode] += [read_row(line) for line in text.splitlines() if line.startswith("motion ")]
+            times[mode].append(np.fromfile(path).reshape(-1, 2))
+        done = ", ".join(f"{mode} {sum(row['success'] > 0 for row in rows[mode])} of {len(rows[mode])}" for mode in MODES)
+        report.say(f"so far: {done}")
+    return {mode: Outcome(rows[mode], np.concatenate(times[mode])) for mode in MODES}
 
-        def shard(first: int) -> tuple[str, Path]:
-            path = Path(folder) / f"{first}.bin"
-            many = min(SHARD, count - first)
-            command = [program, f"motions={many}", f"first={first}", f"seed={SEED}", f"memory={mode}", f"cycles={path}"]
-            done = subprocess.run(command, cwd=BUILD.parent, capture_output=True, text=True, check=False)
-            if done.returncode != 0:
-                raise InputError(f"{relative(program)}: {done.stderr.strip() or 'failed'}")
-            return done.stdout, path
 
-        for n, (text, path) in enumerate(pool.map(shard, range(0, count, SHARD)), 1):
-            rows += [read_row(line) for line in text.splitlines() if line.startswith("motion ")]
-            times.append(np.fromfile(path).reshape(-1, 2))
-            print(f"\r{MODES[mode]}: {min(n * SHARD, count)} of {count} motions", end="", flush=True)
-    print("\r", end="")
-    return Outcome(rows, np.concatenate(times))
+def shard(program: Path, folder: Path, mode: str, first: int, many: int) -> tuple[str, Path]:
+    """What engram-pole prints of motions `first` to `first + many`, and the file of its times. Raises InputError."""
+    name = f"{mode}_{SEED}_{first}_{many}"
+    said, path = folder / f"{name}.txt", folder / f"{name}.bin"
+    if not said.is_file():
+        command = [program, f"motions={many}", f"first={first}", f"seed={SEED}", f"memory={mode}", f"cycles={path}"]
+        done = subprocess.run(command, cwd=BUILD.parent, capture_output=True, text=True, check=False)
+        if done.returncode != 0:
+            raise InputError(f"{relative(program)}: {done.stderr.strip() or 'failed'}")
+        said.write_text(done.stdout, encoding="utf-8")
+    return said.read_text(encoding="utf-8"), path
 
 
 def read_row(line: str) -> dict[str, float]:
