@@ -43,7 +43,8 @@ class Study:
 
 STUDIES = {
     "6.3": Study("panda.ik", "inverse kinematics, Panda with table, box and shelf, d = 10 (table 7.1)",
-                 Recipe(points=(40, 50), rank=16, enrich=16, sweeps=4, starts=2000), 400, 400, slice(3, 10)),
+                 Recipe(points=(20, 48), fitted=True, rank=16, scale=2.0, enrich=16, sweeps=1, seeds=12, spread=True,
+                        starts=2000), 400, 400, slice(3, 10)),
     "6.4": Study("panda.reach", "target reaching, Panda with table, box and shelf, d = 24 (table 7.2)",
                  Recipe(points=(20, 48), weights=(14, 10), fitted=True, rank=32, scale=3.0, enrich=16, sweeps=1, seeds=6,
                         alpha=0.97, spread=True, starts=2000, start_cost=0.13, start_evaluations=500, evaluations=120),
