@@ -5,6 +5,7 @@ and writes the answers to stdout in the same form. Everything in double precisio
 """
 
 import io
+import itertools
 import math
 import sys
 import time
@@ -156,6 +157,43 @@ def predict_one_by_one(question):
     """Processor time of each row of x on its own [us]."""
     x = torch.from_numpy(question["x"])
     return {"us": clocked(lambda i: state["networks"].predict(x[i : i + 1]), len(x))}
+
+
+def mixture_loss(out, y, modes, smallest_std):
+    """Mean negative log likelihood of y (n, m) under the mixtures of a head's numbers, up to a constant."""
+    logits, rest = out[:, :modes], out[:, modes:].reshape(len(out), 2, modes, -1)
+    log_std = rest[:, 1].clamp(min=math.log(smallest_std))
+    z = (y[:, None, :] - rest[:, 0]) * torch.exp(-log_std)
+    return -torch.logsumexp(torch.log_softmax(logits, 1) - (0.5 * z**2 + log_std).sum(2), 1).mean()
+
+
+def fit(question):
+    """Networks (members) from x (n, d) to y (n, m), both standardized, as engram.learn.network.fit_by_pytorch says."""
+    x, y = torch.from_numpy(question["x"]), torch.from_numpy(question["y"])
+    modes, hidden, depth, batch, seed = (int(question[name]) for name in ("modes", "hidden", "depth", "batch", "seed"))
+    smallest_std, m = float(question["smallest_std"]), y.shape[1]
+    steps, found = int(question["epochs"]) * max(1, len(x) // batch), {}
+    for member in range(int(question["members"])):
+        torch.manual_seed(seed + member)
+        sizes = [x.shape[1]] + [hidden] * depth + [modes * (1 + 2 * m) if modes else m]
+        layers = [torch.nn.Linear(a, b) for a, b in itertools.pairwise(sizes)]
+        if modes:  # every mode starts at a sample
+            layers[-1].bias.data[modes : modes * (1 + m)] = y[torch.randperm(len(y))[:modes]].flatten()
+        net = torch.nn.Sequential(*[part for layer in layers for part in (layer, torch.nn.ReLU())][:-1])
+        with torch.enable_grad():
+            adam = torch.optim.Adam(net.parameters(), lr=float(question["rate"]))
+            pace = torch.optim.lr_scheduler.LambdaLR(adam, lambda step: 1 - step / steps)
+            for _ in range(steps):
+                chosen = torch.randint(len(x), (batch,))
+                out = net(x[chosen])
+                loss = mixture_loss(out, y[chosen], modes, smallest_std) if modes else ((out - y[chosen]) ** 2).mean()
+                adam.zero_grad()
+                loss.backward()
+                adam.step()
+                pace.step()
+        for k, layer in enumerate(layers):
+            found[f"weight_{member}_{k}"], found[f"bias_{member}_{k}"] = layer.weight.data.T.numpy(), layer.bias.data.numpy()
+    return found
 
 
 def main():

@@ -6,11 +6,14 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal, multivariate_t
 
+from engram import pytorch
 from engram.emit import Gmr, Gpr, Knn, Logit, Mlp, Sdf, Table
 from engram.emit.arrays import Array
 from engram.engine import engine
+from engram.inputs import InputError
 from engram.learn.mixture import Conditional, Mixture, condition, fit_bayesian, fit_gaussian, mixture_table
-from engram.learn.network import Network, density_gradient, fit_density, fit_ensemble, split_head
+from engram.learn.network import Network, density_gradient, fit_by_pytorch, fit_density, fit_ensemble, split_head
+from engram.pytorch import PyTorch
 
 QUERIES = 10_000
 OK, OUTSIDE, NOT_FINITE = range(3)
@@ -210,6 +213,30 @@ def test_density_network_equals_double(density: Network, data) -> None:
     np.testing.assert_allclose(y, exact, atol=bound)
     np.testing.assert_allclose(var, exact_var, rtol=4 * bound)
     assert np.all(np.diff(answer["weight"], axis=1) <= 0)
+
+
+def test_networks_by_pytorch_or_the_mend_that_is_missing(data) -> None:
+    """An ensemble and a density of the same data, where the optional extra is installed; where it is not, what installs it."""
+    x, y = data
+    if not pytorch.available():
+        with pytest.raises(InputError, match="scripts/setup.sh torch"):
+            fit_by_pytorch(x, y)
+        return
+    net = fit_by_pytorch(x, y, modes=3, hidden=24, epochs=60)
+    h, means, _ = net.predict(x)
+    likely = h > 0.1
+    assert np.mean((likely & (means[:, :, 0] > 2)).any(1) & (likely & (means[:, :, 0] < -2)).any(1)) > 0.9  # both branches
+    smooth = np.sin(2 * x @ np.ones((D, 2)))
+    pair = fit_by_pytorch(x, smooth, hidden=21, depth=3, members=2, epochs=60)
+    found = engine.Table(mlp(pair, x)).answers(x, 2)
+    assert np.abs(np.sort(found["y"], 1) - np.sort(pair.predict(x)[1], 1)).max() < 2 * network_bound(pair, x)
+    assert np.mean((found["y"].mean(axis=1) - smooth) ** 2) < 0.1 * smooth.var()  # nine tenths are learnt
+    with PyTorch() as worker:
+        for each in (net, pair):
+            worker.load_networks(each)
+            answer = worker.ask("predict", x=x)
+            for mine, theirs in zip(each.predict(x), (answer["p"], answer["mean"], answer["variance"]), strict=True):
+                np.testing.assert_allclose(mine, theirs, rtol=1e-9, atol=1e-12)
 
 
 def test_the_gradient_of_the_likelihood() -> None:

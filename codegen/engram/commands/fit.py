@@ -42,6 +42,12 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
         default=CONTEST,
         help=f"held-out tasks on which all learners compete (default: {CONTEST}; 0: no contest)",
     )
+    parser.add_argument(
+        "--trainer",
+        choices=("own", "torch"),
+        default="own",
+        help="of the networks in the contest: scikit-learn and our own descent, or PyTorch (scripts/setup.sh torch)",
+    )
     return parser
 
 
@@ -50,6 +56,7 @@ def run(args: argparse.Namespace) -> int:
     from engram.learn.reproducible import restart_pinned
 
     restart_pinned()
+    from engram import pytorch
     from engram.emit import write_tables
     from engram.engine import engine
     from engram.inputs import InputError
@@ -69,6 +76,8 @@ def run(args: argparse.Namespace) -> int:
 
         fit_and_write(args.data or BUILD / "data" / "talos_step.npz", args.out)
         return 0
+    if args.trainer == "torch" and not pytorch.available():
+        raise InputError(pytorch.MISSING)
     if args.trials < 10:
         raise InputError("--trials must be at least 10")
     spec = load_task(args.robot, args.task)
@@ -84,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     memory = replace(memory, train=fit_train(args.robot, motions, TrainSettings(), progress))
     names = ()
     if args.contest > 0:
-        verdict = hold_contest(spec, memory, source, args.contest, LIMIT, LearnerSettings(), progress)
+        verdict = hold_contest(spec, memory, source, args.contest, LIMIT, LearnerSettings(trainer=args.trainer), progress)
         print("\n".join(f"fit:    {line}" for line in verdict.lines))
         write_figures("contest", [(f"contest.{key}", *figure) for key, *figure in verdict.figures])
         names, memory = verdict.names, replace(memory, ensemble=verdict.ensemble)

@@ -15,7 +15,7 @@ from engram.emit import Knn, Mlp, Table
 from engram.engine import engine
 from engram.learn.memory import Ensemble, Memory, Motions, bow_features
 from engram.learn.mixture import condition, fit_gaussian, mixture_table
-from engram.learn.network import Network, fit_density, fit_ensemble
+from engram.learn.network import Network, fit_by_pytorch, fit_density, fit_ensemble
 from engram.learn.train import POSTURES, SAMPLES, likely, poses
 
 ANSWERS = 8  # asked of every learner, as many as the memory has neighbours
@@ -35,6 +35,7 @@ class Settings:
     modes: int = 8  # of the mixture density network
     epochs: int = 100
     seed: int = 0
+    trainer: str = "own"  # of networks; or "torch": PyTorch
 
 
 def table_bytes(table: Table) -> int:
@@ -117,11 +118,13 @@ def learners(
     made = []
 
     sizes = dict(hidden=settings.hidden, depth=settings.depth, epochs=settings.epochs, seed=settings.seed)
+    torch = settings.trainer == "torch"
+    ensemble, density = (fit_by_pytorch, fit_by_pytorch) if torch else (fit_ensemble, fit_density)
     for name, make in (
         ("gmr", lambda: mixture_table(condition(fit_gaussian(x, y, settings.components, seed=settings.seed)), **shared)),
         ("bgmr", lambda: memory.mixture),
-        ("mlp", lambda: network_table(fit_ensemble(x, y, members=settings.members, **sizes), **shared)),
-        ("mdn", lambda: network_table(fit_density(x, y, modes=settings.modes, **sizes), **shared)),
+        ("mlp", lambda: network_table(ensemble(x, y, members=settings.members, **sizes), **shared)),
+        ("mdn", lambda: network_table(density(x, y, modes=settings.modes, **sizes), **shared)),
     ):
         progress(f"learner {name}")
         learner = from_table(name, make(), nq, m)

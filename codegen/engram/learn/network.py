@@ -1,6 +1,7 @@
-"""Networks from inputs to outputs: ensembles trained by scikit-learn, mixture density networks by gradient descent.
+"""Networks from inputs to outputs: ensembles trained by scikit-learn, mixture density networks by gradient descent; or both by
+PyTorch, an optional extra (engram.pytorch).
 
-Both put out what controller/tab/tab_mlp.h evaluates. Inputs and outputs are standardized for the training; the scale of the
+All put out what controller/tab/tab_mlp.h evaluates. Inputs and outputs are standardized for the training; the scale of the
 outputs is folded into the last layer.
 """
 
@@ -13,6 +14,8 @@ from itertools import pairwise
 import numpy as np
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.neural_network import MLPRegressor
+
+from engram.pytorch import PyTorch
 
 SMALLEST_STD = 1e-3  # of a density's standardized outputs: a sample met exactly must not let the likelihood grow without bound
 
@@ -69,6 +72,17 @@ def spread(values: np.ndarray) -> np.ndarray:
     return np.where(std > 1e-9, std, 1.0)
 
 
+def in_units(weights: list, biases: list, y_mean: np.ndarray, y_std: np.ndarray, modes: int = 0) -> tuple[list, list]:
+    """The layers of a network that was trained on standardized outputs, with their mean and spread in the last of them."""
+    if not modes:
+        return [*weights[:-1], weights[-1] * y_std], [*biases[:-1], biases[-1] * y_std + y_mean]
+    m = len(y_std)
+    scale, shift = np.ones(modes * (1 + 2 * m)), np.zeros(modes * (1 + 2 * m))
+    scale[modes : modes * (1 + m)], shift[modes : modes * (1 + m)] = np.tile(y_std, modes), np.tile(y_mean, modes)
+    shift[modes * (1 + m) :] = np.tile(np.log(y_std), modes)
+    return [*weights[:-1], weights[-1] * scale], [*biases[:-1], biases[-1] * scale + shift]
+
+
 def fit_ensemble(
     x: np.ndarray, y: np.ndarray, *, hidden: int = 64, depth: int = 2, members: int = 1, epochs: int = 300, seed: int = 0
 ) -> Network:
@@ -83,9 +97,9 @@ def fit_ensemble(
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ConvergenceWarning)
             model.fit((x - center) / width, (y - y_mean) / y_std)
-        last, bias = model.coefs_[-1].reshape(hidden, -1), model.intercepts_[-1]
-        weights.append([*model.coefs_[:-1], last * y_std])
-        biases.append([*model.intercepts_[:-1], bias * y_std + y_mean])
+        layers = [*model.coefs_[:-1], model.coefs_[-1].reshape(hidden, -1)]
+        for made, all_of_them in zip(in_units(layers, model.intercepts_, y_mean, y_std), (weights, biases), strict=True):
+            all_of_them.append(made)
     return Network(center, width, weights, biases)
 
 
@@ -133,7 +147,24 @@ def fit_density(
             u += 0.1 * (g - u)
             v += 0.001 * (g * g - v)
             a -= rate * (1 - step / steps) * (u / (1 - 0.9**step)) / (np.sqrt(v / (1 - 0.999**step)) + 1e-8)
-    scale, shift = np.ones(sizes[-1]), np.zeros(sizes[-1])
-    scale[modes : modes * (1 + m)], shift[modes : modes * (1 + m)] = np.tile(y_std, modes), np.tile(y_mean, modes)
-    shift[modes * (1 + m) :] = np.tile(np.log(y_std), modes)
-    return Network(center, width, [[*weights[:-1], weights[-1] * scale]], [[*biases[:-1], biases[-1] * scale + shift]], modes)
+    weights, biases = in_units(weights, biases, y_mean, y_std, modes)
+    return Network(center, width, [weights], [biases], modes)
+
+
+def fit_by_pytorch(
+    x: np.ndarray, y: np.ndarray, *, modes: int = 0, hidden: int = 64, depth: int = 2, members: int = 1, epochs: int = 300,
+    batch: int = 64, rate: float = 1e-3, seed: int = 0,
+) -> Network:  # fmt: skip
+    """The same by PyTorch: least squares, with modes > 0 the largest likelihood of a mixture, by Adam with a step that falls to
+    zero. Raises InputError if PyTorch is missing."""
+    center, width, y_mean, y_std = x.mean(axis=0), spread(x), y.mean(axis=0), spread(y)
+    with PyTorch() as worker:
+        found = worker.ask(
+            "fit", x=(x - center) / width, y=(y - y_mean) / y_std, modes=modes, hidden=hidden, depth=depth, members=members,
+            epochs=epochs, batch=batch, rate=rate, seed=seed, smallest_std=SMALLEST_STD,
+        )  # fmt: skip
+    made = [
+        in_units(*([found[f"{name}_{i}_{k}"] for k in range(depth + 1)] for name in ("weight", "bias")), y_mean, y_std, modes)
+        for i in range(members)
+    ]
+    return Network(center, width, [weights for weights, _ in made], [biases for _, biases in made], modes)
