@@ -35,7 +35,8 @@ using VelocityBounds = ResidualTerm<FrameVelocity<R, R::kRhFoot, Axes::kLocal>, 
 using Rotation = ResidualTerm<FrameRotation<R, R::kLfFoot>>;
 using Momentum = ResidualTerm<CentroidalMomentum<R>>;
 template <class C, class... More>
-using Everything = ContactOcp<C, Velocity<Axes::kLocal>, Velocity<Axes::kWorld>, Velocity<Axes::kLocalWorldAligned>, VelocityBounds, Rotation,
+using Everything = ContactOcp<C, ConeLimit<WrenchConeTerm<0>>, ConeLimit<FrictionConeTerm<1>>,
+                              Velocity<Axes::kLocal>, Velocity<Axes::kWorld>, Velocity<Axes::kLocalWorldAligned>, VelocityBounds, Rotation,
                               Momentum, StateBoundTerm<R>, ContactForceTerm<C, 0>, ContactForceTerm<C, 1>, CopTerm<0>, WrenchConeTerm<0>,
                               FrictionConeTerm<1>, ComTerm<R>, FramePlacementTerm<R, R::kRfFoot>, FrameReachTerm<R, R::kRfFoot>, More...>;
 
@@ -60,6 +61,8 @@ template <class P> struct Oracle {
       std::copy_n(values, n, reinterpret_cast<double*>(&p));
       done = true;
     };
+    put("wrench_limit", param_of<ConeLimit<WrenchConeTerm<0>>>(knot));
+    put("friction_limit", param_of<ConeLimit<FrictionConeTerm<1>>>(knot));
     put("velocity_local", param_of<Velocity<Axes::kLocal>>(knot));
     put("velocity_world", param_of<Velocity<Axes::kWorld>>(knot));
     put("velocity_aligned", param_of<Velocity<Axes::kLocalWorldAligned>>(knot));

@@ -273,11 +273,18 @@ def differences(oracle, axes, terms, phase, x, u, of) -> np.ndarray:
     return np.array(columns).T
 
 
+def cone_limit(cone: np.ndarray, faces: int) -> np.ndarray:
+    """Penalties, bounds and multipliers of every face, and the cone's own parameters, whose weight is not used."""
+    return np.r_[draw(faces), np.full(faces, -1e8), np.full(faces, -5.0), 3.0 * draw(faces), cone]
+
+
 # Terms that Crocoddyl has not.
 OWN = {
     "zmp": np.array([2.0, 1.5, 0.4, -0.3, 0.02]),  # weights, reference, height
     "reach": np.array([20.0, 0.15, 1.0, -0.6, 0.4]),  # weight, near, target: far beyond `near`, where the pull is bounded
     "reach_near": np.array([20.0, 2.0, 0.35, -0.2, 0.05]),
+    "wrench_limit": cone_limit(TERMS["wrench_cone"][0], 17),
+    "friction_limit": cone_limit(TERMS["friction_cone"][0], 5),
 }
 
 
