@@ -152,6 +152,7 @@ template <class G> class Gait {
   }
 
   bool walking() const { return cursor_.index != kStanding; }
+  bool leads() const { return cursor_.index == kLead; }  // about to walk
   int64_t slot() const { return slot_; }
   const Placement& body() const { return body_; }
   // Slots since the phase under way began.

@@ -210,11 +210,13 @@ template <class C> double LeggedModel<C>::heading(int64_t utime) const {
   return gait_.body_at((utime - origin_) / kStepUs, pace_).yaw;
 }
 
-// The pace goes to the task's at the acceleration that the robot bears: footholds of feet in the air would jump with it.
+// The pace goes to the task's at the acceleration that the robot bears: footholds of feet in the air would jump with it. It begins with
+// the first swing: a step that made up for the time before would turn the hips to their limits.
 template <class C> void LeggedModel<C>::follow() {
   constexpr double step = C::kAcceleration * 1e-6 * kTickUs;
   const auto towards = [](double from, double to) { return std::clamp(to, from - step, from + step); };
-  pace_ = {towards(pace_.vx, now_.pace.vx), towards(pace_.vy, now_.pace.vy), towards(pace_.wz, now_.pace.wz), now_.pace.walk};
+  const Pace wanted = gait_.leads() ? Pace{} : now_.pace;
+  pace_ = {towards(pace_.vx, wanted.vx), towards(pace_.vy, wanted.vy), towards(pace_.wz, wanted.wz), now_.pace.walk};
 }
 
 // The centre of mass over the window, from where the reference is.

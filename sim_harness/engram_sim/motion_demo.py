@@ -12,7 +12,7 @@ from engram.inputs import InputError
 from engram.paths import relative
 from engram.tasks.motion import load_motion
 from engram.tasks.scene import write_shown_scene
-from engram_sim import motion_report, scenarios, video
+from engram_sim import motion_report, scenarios, video, walking
 from engram_sim.motion import Motion
 from engram_sim.pair import Pair, Progress, plant_option, private_port, scene
 from engram_sim.results import Run, read_run, wilson
@@ -61,6 +61,9 @@ def finish(folder: Path, header: dict[str, Any], seconds: float, figures_folder:
     spec = load_motion(header["robot"], header["task"])
     if not parts(run):
         raise InputError(f"{relative(folder)}: no part of the script has ended; nothing to report")
+    motion = Motion(run, spec.robot, header["site"])
+    for part in parts(run):
+        part.update(walking.measure(motion, part))
     drawn = folder / "demo.mp4"
     if seconds > 0:
         clips = choose(run, seconds)
@@ -80,7 +83,6 @@ def finish(folder: Path, header: dict[str, Any], seconds: float, figures_folder:
     figures_folder.mkdir(parents=True, exist_ok=True)
     name = f"demo_{header['robot']}.json"
     (figures_folder / name).write_text(json.dumps(figures(header["robot"], run, summary), indent=1) + "\n", encoding="utf-8")
-    motion = Motion(run, spec.robot, header["site"])
     page = motion_report.write(folder, motion, parts(run), summary, drawn if drawn.is_file() else None)
     print_summary(summary, run)
     print(f"said    {last_line(run.folder / 'controller.txt')}")
@@ -118,10 +120,14 @@ def summarize(run: Run) -> dict[str, Any]:
     }
     row["torque_share_max"] = max(part["torque_share"] for part in done)
     row["sim_s"] = run.plant["sim_seconds"]
-    for key in ("com_drift_m", "com_height_rms_m"):
+    for key in ("com_drift_m", "com_height_rms_m", "com_rms_m", "landing_max_m"):
         values = [part[key] for part in done if key in part]
         if values:
             row[f"{key}_max"] = max(values)
+    steps = [part for part in done if part.get("steps")]
+    if steps:
+        row["steps"] = sum(part["steps"] for part in steps)
+        row["landing_mean_m"] = sum(part["steps"] * part["landing_mean_m"] for part in steps) / row["steps"]
     arrivals = [part["arrival_s"] for part in done if part.get("arrival_s", -1.0) >= 0.0]
     if arrivals:
         row["arrival_median_s"] = float(np.median(arrivals))
@@ -145,6 +151,10 @@ def figures(robot: str, run: Run, summary: dict[str, Any]) -> list[dict[str, Any
     add("torque_share_max", summary["torque_share_max"], "1", n)
     add("com_drift_m", summary.get("com_drift_m_max"), "m", 1)
     add("com_height_rms_m", summary.get("com_height_rms_m_max"), "m", 1)
+    add("steps", summary.get("steps"), "1", n)
+    add("landing_mean_m", summary.get("landing_mean_m"), "m", summary.get("steps", 0))
+    add("landing_max_m", summary.get("landing_max_m_max"), "m", summary.get("steps", 0))
+    add("com_rms_m", summary.get("com_rms_m_max"), "m", n)
     add("arrival_s", summary.get("arrival_median_s"), "s", summary["successes"])
     for part in parts(run):
         if "pace" in part:

@@ -25,6 +25,10 @@ def measures(part: dict[str, Any]) -> str:
         told.append(f"height error {1e3 * part['com_height_rms_m']:.1f} mm rms")
     if "pace" in part:
         told.append(f"mean {part['pace'][0]:.3f}, {part['pace'][1]:.3f} m/s, {part['pace'][2]:.3f} rad/s")
+    if part.get("steps"):
+        mean, most = 1e3 * part["landing_mean_m"], 1e3 * part["landing_max_m"]
+        told.append(f"{part['steps']} steps, landing error {mean:.1f} mm, at most {most:.1f} mm")
+        told.append(f"centre of mass {1e3 * part['com_rms_m']:.1f} mm rms off its reference")
     if "arrival_s" in part:
         told.append(f"arrives after {part['arrival_s']:.2f} s" if part["arrival_s"] >= 0.0 else "never there")
     if "tilt_max_rad" in part:

@@ -68,13 +68,19 @@ def talos_stand(spec: MotionSpec, seed: int, parts: int | None) -> Script:
 
 
 def talos_walk(spec: MotionSpec, seed: int, parts: int | None) -> Script:
-    """Walks of some 20 steps at three commands each, with turns and side steps; every walk ends standing."""
+    """Walks of some 20 steps at three commands each, with turns and side steps, then a stop; the last two walks are pushed."""
     rng = np.random.default_rng([HELD_OUT, seed])
     episodes = []
-    for n in range(parts or 5):
-        commands = [f"task {t} {numbers(rng.uniform([0.0, -0.06, -0.25], [0.4, 0.06, 0.25]))} 1" for t in (0.5, 5.5, 10.5)]
-        episodes.append([f"episode walk_{n + 1} 19", home(spec, YAWS[n % 4]), *commands, "task 15.5 0 0 0 0", "upright 0.6 0.7"])
-    return scenario(spec, seed, episodes, "torso")
+    for n in range(5):
+        commands = [f"task {t} {numbers(rng.uniform([-0.1, -0.06, -0.25], [0.4, 0.06, 0.25]))} 1" for t in (0.5, 5.0, 9.5)]
+        blows = [
+            push(round(float(t), 3), "torso_2_joint", 10.0, float(rng.uniform(0.0, 360.0)))
+            for t in rng.uniform([3, 7, 11], [5, 9, 13])
+        ]
+        name, blows = (f"walk_{n + 1}", []) if n < 3 else (f"walk_{n + 1}_pushed_10Ns", blows)
+        stand, stop = "task 0 0 0 0 0", "task 13.9 0 0 0 0"
+        episodes.append([f"episode {name} 17.5", home(spec, YAWS[n % 4]), stand, *commands, stop, *blows, "upright 0.6 0.7"])
+    return scenario(spec, seed, episodes[:parts], "torso", ["--log-every", "10"])
 
 
 def talos_pole(spec: MotionSpec, seed: int, parts: int | None) -> Script:
@@ -116,11 +122,10 @@ def anymal_trot(spec: MotionSpec, seed: int, parts: int | None) -> Script:
     return scenario(spec, seed, episodes[:parts], "base")
 
 
-def scenario(spec: MotionSpec, seed: int, episodes: list[list[str]], site: str) -> Script:
+def scenario(spec: MotionSpec, seed: int, episodes: list[list[str]], site: str, options: list[str] | None = None) -> Script:
     """A script of episodes."""
-    return Script(
-        "scenario", header(spec, "scenario", seed) + [line for lines in episodes for line in lines], len(episodes), site
-    )
+    lines = header(spec, "scenario", seed) + [line for lines in episodes for line in lines]
+    return Script("scenario", lines, len(episodes), site, options or [])
 
 
 def hector_fly(spec: MotionSpec, seed: int, parts: int | None) -> Script:
