@@ -145,7 +145,8 @@ int main(int argc, char** argv) {
       if (!at(t.at)) continue;
       const engram_status status =
           engram_set_task(controller.handle, plant.utime, ++jump, t.values.data(), static_cast<int32_t>(t.values.size()));
-      if (status != ENGRAM_CONVERGED) bench::fail(std::string("engram-trial: task refused: ") + engram_status_text(status));
+      if (status != ENGRAM_CONVERGED) bench::fail(std::string("engram-trial: task refused: ") + engram_status_text(status) +
+                    ": numbers, units and ranges of a task vector are in models/<robot>/<task>/task.toml");
     }
     for (const Event& p : pushes) {
       const double x = p.values.at(0) / kPushSeconds, y = p.values.at(1) / kPushSeconds, c = std::cos(heading), s = std::sin(heading);

@@ -81,8 +81,9 @@ def finish(folder: Path, header: dict[str, Any], seconds: float, figures_folder:
         summary["wall_s"] = round(time.monotonic() - start, 1)
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     figures_folder.mkdir(parents=True, exist_ok=True)
-    name = f"demo_{header['robot']}.json"
-    (figures_folder / name).write_text(json.dumps(figures(header["robot"], run, summary), indent=1) + "\n", encoding="utf-8")
+    name = subject(header["robot"], header["task"])
+    records = json.dumps(figures(name, run, summary), indent=1) + "\n"
+    (figures_folder / f"demo_{name.replace('.', '_')}.json").write_text(records, encoding="utf-8")
     page = motion_report.write(folder, motion, parts(run), summary, drawn if drawn.is_file() else None)
     print_summary(summary, run)
     print(f"said    {last_line(run.folder / 'controller.txt')}")
@@ -138,13 +139,18 @@ def summarize(run: Run) -> dict[str, Any]:
     return row
 
 
-def figures(robot: str, run: Run, summary: dict[str, Any]) -> list[dict[str, Any]]:
-    """Records of build/figures/demo_<robot>.json; what was not measured is absent."""
+def subject(robot: str, task: str) -> str:
+    """What figures are named after: the robot, and its task if it has others that are shown."""
+    return f"{robot}.{task}" if task in ("walk", "pole") else robot
+
+
+def figures(name: str, run: Run, summary: dict[str, Any]) -> list[dict[str, Any]]:
+    """Records demo.<name>.<what>; what was not measured is absent."""
     records = []
 
-    def add(name: str, value: float | None, unit: str, n: int) -> None:
+    def add(what: str, value: float | None, unit: str, n: int) -> None:
         if value is not None:
-            records.append({"id": f"demo.{robot}.{name}", "value": value, "unit": unit, "n": n})
+            records.append({"id": f"demo.{name}.{what}", "value": value, "unit": unit, "n": n})
 
     n = summary["parts"]
     add("success", summary["success"], "1", n)
@@ -162,8 +168,7 @@ def figures(robot: str, run: Run, summary: dict[str, Any]) -> list[dict[str, Any
     for phase in ("linearize", "backward", "rollout", "total"):
         times = summary.get(f"{phase}_us", {})
         for kind in PERCENTILES:
-            name = f"cycle_us.{kind}" if phase == "total" else f"{phase}_us.{kind}"
-            add(name, times.get(kind), "us", times.get("n", 0))
+            add(f"cycle_us.{kind}" if phase == "total" else f"{phase}_us.{kind}", times.get(kind), "us", times.get("n", 0))
     return records
 
 

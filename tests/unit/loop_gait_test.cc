@@ -5,6 +5,8 @@
 #include <memory>
 
 #include "controller/loop/loop_anymal.h"
+#include "controller/loop/loop_capture.h"
+#include "controller/loop/loop_talos.h"
 
 namespace engram {
 namespace {
@@ -37,6 +39,65 @@ TEST(Swing, BeginsAndEndsAtRestOnTheGround) {
   const double h = 1e-4;  // rise 16 h_swing s^2: 1e-8 after a step of h
   EXPECT_LT(std::fabs(swing_placement(from, to, 0.06, h).p[2]), 1e-7);
   EXPECT_LT(std::fabs(swing_placement(from, to, 0.06, 1.0 - h).p[2]), 1e-7);
+}
+
+// Whatever is commanded and however hard the push, no foot of Talos lands on the other one, across it, or out of reach.
+TEST(GaitTest, StepsStayOffEachOtherAndWithinReach) {
+  using W = TalosWalk::Gait;
+  using Task = TalosWalk::Task;
+  for (double vx : {Task::task_lo[0], Task::task_hi[0]})
+    for (double vy : {Task::task_lo[1], 0.0, Task::task_hi[1]})
+      for (double wz : {Task::task_lo[2], Task::task_hi[2]})
+        for (double push : {-1.0, 0.0, 1.0}) {
+          Gait<W> gait;
+          const Placement body = at(0.3, -0.2, 1.0), feet[2] = {moved(body, 0.0, 0.085), moved(body, 0.0, -0.085)};
+          gait.begin(0, feet, body);
+          const Pace pace = {vx, vy, wz, true};
+          const double shift[2] = {push, -push};
+          for (int64_t slot = 0; slot < 120; ++slot) {
+            gait.advance(slot, pace);
+            gait.plan(pace, 40, shift);
+            for (int64_t later = slot; later < slot + 40; ++later) {
+              const auto& p = gait.at(later);
+              if (p.swing == 0) continue;
+              const int f = p.swing == 1u ? 0 : 1;
+              const Placement& stands = p.from[1 - f];
+              const double dx = p.to[f].p[0] - stands.p[0], dy = p.to[f].p[1] - stands.p[1], c = std::cos(stands.yaw), s = std::sin(stands.yaw);
+              EXPECT_LE(std::fabs(c * dx + s * dy), Task::gait_ahead + 1e-12);
+              EXPECT_GE((f == 0 ? 1.0 : -1.0) * (-s * dx + c * dy), Task::gait_aside[0] - 1e-12);
+              EXPECT_LE((f == 0 ? 1.0 : -1.0) * (-s * dx + c * dy), Task::gait_aside[1] + 1e-12);
+            }
+          }
+        }
+}
+
+struct Law {
+  static constexpr double gain = 1.0, hold[2] = {0.03, 0.02}, reach = 0.3, rate = 1.0;
+};
+
+TEST(Capture, MovesFootholdsByWhatTheSolesCannotHold) {
+  CaptureStep<Law> step;
+  const double grows = 3.0, none[2] = {0.0, 0.0}, little[2] = {0.029, -0.019}, much[2] = {0.05, 0.0};
+  step.update(little, 0.0, grows, 1.0);
+  EXPECT_EQ(step.shift()[0], 0.0);
+  EXPECT_EQ(step.shift()[1], 0.0);
+  step.update(much, 0.0, grows, 1.0);
+  EXPECT_NEAR(step.shift()[0], 3.0 * (0.05 - 0.03), 1e-15);
+  const double left[2] = {0.05 - step.shift()[0] / grows, 0.0};  // the reference has gone along with the foothold
+  step.update(left, 0.0, grows, 1.0);
+  EXPECT_NEAR(step.shift()[0], 0.06, 1e-15);
+  step.clear();
+  step.update(much, 0.5 * M_PI, grows, 1.0);  // sideways now: the soles hold less
+  EXPECT_NEAR(step.shift()[0], 3.0 * (0.05 - 0.02), 1e-15);
+  const double huge[2] = {0.0, -1.0};
+  step.clear();
+  step.update(huge, 0.0, grows, 0.1);
+  EXPECT_NEAR(step.shift()[1], -0.1, 1e-15);  // no faster than a foot follows
+  for (int i = 0; i < 9; ++i) step.update(huge, 0.0, grows, 0.1);
+  EXPECT_NEAR(step.shift()[1], -0.3, 1e-15);  // no farther than it reaches
+  step.clear();
+  step.update(none, 0.0, grows, 1.0);
+  EXPECT_EQ(step.shift()[1], 0.0);
 }
 
 TEST(GaitTest, StandsUntilAskedToWalkAndAgainAfterwards) {
