@@ -8,8 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from engram.engine import engine
+from engram.paths import MODELS
 from engram.study.report import Report
 from engram.study.trains import SOLVED, Recipe, build, lowest, samples, table_of
+from engram.tasks.world import read_boxes
 
 DISCS = {  # as in codegen/offline/study_planar.cc: centre and radius [m]
     "planar3": [(0.7, 1.2, 0.3), (1.6, 0.5, 0.2), (-0.6, 1.2, 0.3), (0.9, -0.9, 0.35)],
@@ -96,7 +98,38 @@ def single_task(report: Report, quick: bool) -> None:
         report.figure(f"{robot}.cpu_s.max", max(clocks), "s", n=len(results))
         found.append((robot, paths[0]))
     draw_paths(report, found[0][1][:4], "planar4", "four_link")
+    draw_hand(report, found[1][1], "panda_hand")
     report.close()
+
+
+def draw_hand(report: Report, paths: list[np.ndarray], name: str) -> None:
+    """The ways of the Panda's hand among the boxes of its world, from the side and from the front, and its tilt (figure B.3)."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    boxes = read_boxes(MODELS / "panda" / "reach" / "world.xml")
+    half = np.einsum("nij,nj->ni", np.abs(boxes.R_WO), boxes.half)  # of the box around a box, along the world's axes
+    fig, axes = plt.subplots(1, 3, figsize=(11, 3.4))
+    for axis, (i, label) in zip(axes, ((0, "x [m]"), (1, "y [m]")), strict=False):
+        for p, h in zip(boxes.p_WO, half, strict=True):
+            axis.add_patch(plt.Rectangle((p[i] - h[i], p[2] - h[2]), 2 * h[i], 2 * h[2], color="0.5", alpha=0.25))
+        for path in paths:
+            p_WH = engine.panda.frame_placement(path, "hand_tcp")[1]
+            axis.plot(p_WH[:, i], p_WH[:, 2], ".-")
+            axis.plot(p_WH[[0, -1], i], p_WH[[0, -1], 2], "o", color="red", ms=5)
+        axis.set_xlabel(label)
+        axis.set_ylabel("z [m]")
+        axis.set_aspect("equal")
+    for path in paths:
+        axes[2].plot([tilt(q[None]) for q in path], ".-")
+    axes[2].set_xlabel("point of the path")
+    axes[2].set_ylabel("tilt [deg]")
+    axes[2].set_ylim(0, 90)
+    fig.tight_layout()
+    fig.savefig(report.picture(name), dpi=90)
+    plt.close(fig)
 
 
 def shelf_postures() -> tuple[np.ndarray, np.ndarray]:
