@@ -1,0 +1,109 @@
+// link: engram_talos_pole legged_plant
+// A memory that talks nonsense does no harm: tables of random numbers with a valid digest, in closed loop; and whatever a memory says, the
+// plan that is accepted never costs more than the shifted one.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <random>
+#include <vector>
+
+#include "controller/loop/loop_controller.h"
+#include "controller/loop/loop_receding.h"
+#include "controller/loop/loop_talos_pole.h"
+#include "tables/talos_pole/tables.h"
+#include "tests/support/legged_plant.h"
+
+namespace engram::test {
+namespace {
+
+TabKnn random_knn = talos_pole_knn_v1;
+TabPca random_path = talos_pole_path_v1;
+constexpr PoleTables kRandomTables = {&random_knn, &random_path};
+using Model = LeggedModel<TalosPoleRemembers<kRandomTables>>;
+const engram_model kRandom = loop_model<Model, RecedingPlanner<Model>>("talos", "pole");
+
+// Every array but the domain and the scales becomes random numbers in [-size, size]; the digest is that of the new ones.
+class RandomTables : public testing::Environment {
+ public:
+  void SetUp() override {
+    random_knn.x = fill(random_knn.head, 3, 1.0f);
+    random_knn.value = fill(random_knn.head, 4, 3.0f);
+    random_path.mean = fill(random_path.head, 2, 1.5f);
+    random_path.basis = fill(random_path.head, 3, 0.5f);
+    random_knn.head.digest = tab_digest(&random_knn.head);
+    random_path.head.digest = tab_digest(&random_path.head);
+  }
+
+ private:
+  const float* fill(TabHead& head, int array, float size) {
+    constexpr std::size_t line = 64 / sizeof(float);
+    std::vector<float>& numbers = numbers_.emplace_back(head.array[array].count + line);
+    std::uniform_real_distribution<float> within(-size, size);
+    for (float& number : numbers) number = within(rng_);
+    const auto past = reinterpret_cast<std::uintptr_t>(numbers.data()) / sizeof(float) % line;
+    const float* const at = numbers.data() + (past == 0 ? 0 : line - past);  // tables lie on cache lines
+    head.array[array].data = at;
+    return at;
+  }
+  std::mt19937 rng_{5};
+  std::vector<std::vector<float>> numbers_;
+};
+testing::Environment* const kTables = testing::AddGlobalTestEnvironment(new RandomTables);
+
+constexpr double kRight[3] = {0.40, -0.53, 1.04}, kLeft[3] = {0.33, -0.06, 1.16}, kWay[3] = {0.12, -0.27, 1.0};
+
+struct Loop {
+  explicit Loop(const engram_model* model, const engram_options* options = nullptr) : plant(model, 0.0), controller(model, options) {}
+  LeggedPlant plant;
+  LeggedController controller;
+  int asked = 0, won = 0, worse = 0, jump = 0;
+
+  void go(const double* target, int ms) {
+    ASSERT_EQ(engram_set_task(controller.handle, plant.utime, ++jump, target, 3), ENGRAM_CONVERGED);
+    for (int t = 0; t < ms; ++t) {
+      const bool ticks = plant.utime % 10000 == 0;
+      controller.step(plant);
+      const engram_cycle& c = controller.cycle();
+      if (ticks && c.nguess == 2) {
+        ++asked;
+        const bool memory = c.winner == ENGRAM_CANDIDATE_KNN;
+        won += memory;
+        worse += !(c.merit[memory] <= c.merit[0]);
+      }
+      ASSERT_GT(plant.base_up(), 0.9) << "fallen at " << t << " ms of jump " << jump;
+    }
+  }
+  double away(const double* p) const {
+    const double* const hand = plant.data()->site_xpos + 3 * mj_name2id(plant.model(), mjOBJ_SITE, "right_gripper");
+    return std::hypot(hand[0] - p[0], hand[1] - p[1], hand[2] - p[2]);
+  }
+};
+
+// The motion that the shifted plan alone masters (legged_pole_test.cc).
+TEST(PoleAdversary, RandomTablesDoNoHarm) {
+  Loop loop(&kRandom);
+  ASSERT_EQ(loop.controller.error, ENGRAM_NO_ERROR);
+  loop.go(kRight, 2000);
+  EXPECT_LT(loop.away(kRight), 0.02);
+  loop.go(kWay, 1000);
+  loop.go(kLeft, 2000);
+  EXPECT_LT(loop.away(kLeft), 0.02);
+  EXPECT_GT(loop.asked, 300);
+  EXPECT_EQ(loop.worse, 0);
+  RecordProperty("won", loop.won);
+}
+
+TEST(PoleAdversary, TheAcceptedPlanNeverCostsMoreThanTheShiftedOne) {
+  Loop loop(&engram_talos_pole);
+  constexpr double kEdge[3] = {0.55, -0.75, 0.8};  // of the task's domain, where no run has been
+  loop.go(kRight, 1000);
+  loop.go(kLeft, 1500);
+  loop.go(kEdge, 500);
+  EXPECT_GT(loop.asked, 200);
+  EXPECT_GT(loop.won, 20);
+  EXPECT_EQ(loop.worse, 0);
+}
+
+}  // namespace
+}  // namespace engram::test
