@@ -257,6 +257,9 @@ class Bench:
     def roofline(self, name: str, ours: dict, times: dict[str, Samples]) -> None:
         """How far the machine's limits are: the time of the flops at the rate of a matrix product, and the traffic."""
         print(f"  up to 100 knots take {ours['memory'] / 1e6:.2f} MB; a matrix product, {self.gemm_rate:.0f} GFLOP/s")
+        self.figures.rows.append(
+            {"id": f"size.{name}.solver_bytes", "value": int(ours["memory"]), "unit": "B", "n": 1, "gate": True}
+        )
         for phase in PHASES:
             flops, size, us = ours[f"flops_{phase}"], ours[f"bytes_{phase}"], times[phase].median
             limit = flops / self.gemm_rate * 1e-3

@@ -8,8 +8,11 @@
 namespace engram::bench {
 namespace {
 
+constexpr size_t kTalosBudget = 16'000'000;  // bytes of one solver of up to kMaxKnots knots, all of its memory
+
 template <class P> void run_talos(int knots, int steps, double length, const std::string& command, const char* argument) {
   static Problem<P> problem;
+  static_assert(sizeof(problem) <= kTalosBudget, "Crocoddyl takes 400 MB");
   TalosWalk<P, kMaxKnots>(knots, steps, length, problem.horizon);
   legged_cold_start(problem.horizon, problem.solution);
   run_problem(problem, command, argument);
