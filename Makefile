@@ -26,7 +26,7 @@ demo: setup
 	@.venv/bin/engram demo --robot $(ROBOT) $(if $(TASK),--task $(TASK)) --seed $(SEED) $(ARGS)
 
 test: setup
-	@scripts/test.sh $(ARGS)
+	@.venv/bin/python scripts/test.py $(ARGS)
 
 bench: export TARGETS = engram_bench engram_bench_single query_bench _engine
 bench: setup

@@ -119,6 +119,12 @@ setup_build() {
   compile build ${TARGETS:-all}
 }
 
+# The unit and fuzz tests under AddressSanitizer and UndefinedBehaviorSanitizer.
+setup_sanitized() {
+  configure build/asan Debug -DENGRAM_SANITIZE=ON
+  compile build/asan sanitized_tests
+}
+
 # The renderer's scenes: meshes of the robot and the world around it, from models/ into build/.
 setup_scene() {
   local stamp
@@ -147,7 +153,7 @@ setup_network() {
 [ $# -gt 0 ] || set -- packages python build scene network
 for step in "$@"; do
   case $step in
-    packages | python | build | scene | network | torch) "setup_$step" ;;
-    *) fail "unknown step $step" "steps: packages python build scene network torch" ;;
+    packages | python | build | sanitized | scene | network | torch) "setup_$step" ;;
+    *) fail "unknown step $step" "steps: packages python build sanitized scene network torch" ;;
   esac
 done

@@ -1,8 +1,8 @@
 """Builds and runs every test, rung by rung, and closes with one line: `N passed, N failed`.
 
 The ladder: unit, reference, golden, closed_loop, hil, fuzz (C++ by ctest, Python by pytest), then `sanitize`: the C++ unit and
-fuzz tests once more under AddressSanitizer and UndefinedBehaviorSanitizer. A rung with fewer tests than tests/floor.txt
-says fails: tests must not vanish.
+fuzz tests once more under AddressSanitizer and UndefinedBehaviorSanitizer, which compile while the other rungs run. A rung
+with fewer tests than tests/floor.txt says fails: tests must not vanish.
 
     scripts/test.py                    everything
     scripts/test.py unit golden        some rungs
@@ -101,6 +101,20 @@ def run_pytest(rung: str, count: Count) -> None:
         count.failed += 1
 
 
+def build_sanitized() -> subprocess.Popen:
+    """Starts to compile the sanitized tests, out of the way of the rungs that run meanwhile."""
+    command = ["nice", ROOT / "scripts" / "setup.sh", "sanitized"]
+    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+
+
+def await_sanitized(build: subprocess.Popen, count: Count) -> None:
+    """Waits for the sanitized tests; a build that stops is one failure."""
+    said, _ = build.communicate()
+    if build.returncode:
+        print(said, flush=True)
+        count.failed += 1
+
+
 def read_floor() -> dict[str, int]:
     """Smallest number of tests of each rung."""
     lines = (line.split("#")[0].split() for line in FLOOR.read_text().splitlines())
@@ -110,7 +124,7 @@ def read_floor() -> dict[str, int]:
 def write_floor(counts: dict[str, Count]) -> None:
     """Keeps the present number of tests as the new floor."""
     rows = "".join(f"{rung} {count.ran}\n" for rung, count in counts.items())
-    FLOOR.write_text("# Smallest number of tests on each rung; `scripts/test.sh --raise-floor` writes it.\n" + rows)
+    FLOOR.write_text("# Smallest number of tests on each rung; `scripts/test.py --raise-floor` writes it.\n" + rows)
 
 
 def main() -> int:
@@ -124,10 +138,12 @@ def main() -> int:
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; tests send it
     counts: dict[str, Count] = {}
+    sanitized = build_sanitized() if "sanitize" in rungs else None
     for rung in rungs:
         print(f"---- {rung} ----", flush=True)
         start, count = time.monotonic(), Count()
-        if rung == "sanitize":
+        if sanitized and rung == "sanitize":
+            await_sanitized(sanitized, count)
             run_ctest(BUILD / "asan", rung, "unit|fuzz", count)
         else:
             run_ctest(BUILD, rung, rung, count)

@@ -1,4 +1,4 @@
-"""Single precision (ENGRAM_SINGLE) beside double: the two bench programs at the same input, with the gates of bench/run.py."""
+"""Single precision (ENGRAM_SINGLE) beside double: the programs of bench/ at the same input, with the gates of bench/run.py."""
 
 import sys
 from pathlib import Path
@@ -11,7 +11,7 @@ from engram.paths import ROOT
 sys.path.insert(0, str(ROOT / "bench"))
 from run import PROBLEMS, gate_problem_single, gate_rigid_body_single, run_json
 
-BENCH = ROOT / "build" / "bench"
+PROGRAMS = ROOT / "build" / "tests"
 STATES = 20
 
 
@@ -19,7 +19,7 @@ def both(name: str, *numbers: np.ndarray, folder: Path) -> tuple[dict, dict]:
     """What the single and the double program print for the numbers."""
     file = folder / f"{name}.txt"
     np.savetxt(file, np.concatenate([n.ravel() for n in numbers]), fmt="%.17g")
-    return tuple(run_json(BENCH / program, "compare", name, file) for program in ("engram_bench_single", "engram_bench"))
+    return tuple(run_json(PROGRAMS / program, "compare", name, file) for program in ("precision_single", "precision_double"))
 
 
 @pytest.mark.parametrize(("robot", "nq", "nv"), [("panda", 7, 7), ("talos", 39, 38)])
