@@ -1,5 +1,6 @@
 #include "tests/support/legged_plant.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
@@ -32,6 +33,7 @@ LeggedPlant::LeggedPlant(const engram_model* model, double heading)
   mju_mulQuat(d_->qpos + 3, turn, home + 3);
   q.resize(static_cast<size_t>(m_->nq));
   v.resize(static_cast<size_t>(m_->nv));
+  delay(0);
   measure();
 }
 
@@ -40,11 +42,16 @@ LeggedPlant::~LeggedPlant() {
   mj_deleteModel(m_);
 }
 
+void LeggedPlant::delay(int steps) {
+  delay_ = steps;
+  under_way_.resize(static_cast<size_t>((1 + steps) * m_->nu));
+}
+
 void LeggedPlant::step(const double* tau) {
-  const auto nu = static_cast<size_t>(m_->nu);
-  under_way_.emplace_back(tau, tau + nu);
-  std::memcpy(d_->ctrl, under_way_.front().data(), sizeof(double) * nu);  // until the first one acts, it acts already
-  if (under_way_.size() > static_cast<size_t>(delay_)) under_way_.pop_front();
+  const auto slot = [this](int64_t step) { return under_way_.data() + step % (1 + delay_) * m_->nu; };
+  std::copy_n(tau, m_->nu, slot(steps_));
+  std::copy_n(slot(std::max<int64_t>(0, steps_ - delay_)), m_->nu, d_->ctrl);  // until the first one acts, it acts already
+  ++steps_;
   mj_step(m_, d_);
   utime += kStepUs;
   measure();

@@ -4,7 +4,6 @@
 
 #include <mujoco/mujoco.h>
 
-#include <deque>
 #include <map>
 #include <string>
 #include <vector>
@@ -31,7 +30,7 @@ class LeggedPlant {
   // steps late; ground under the sole that is higher than elsewhere by so much [m], to be changed while the foot is in the air.
   void add_mass(const char* body, double mass);
   void friction(double mu);
-  void delay(int steps) { delay_ = steps; }
+  void delay(int steps);
   void raise_ground(const char* sole, double height);
 
   int64_t utime = 0;
@@ -46,9 +45,9 @@ class LeggedPlant {
   void measure();
   mjModel* m_ = nullptr;
   mjData* d_ = nullptr;
-  int delay_ = 0;
-  std::deque<std::vector<double>> under_way_;  // commands that do not act yet
-  std::map<std::string, double> ground_;       // m, of each sole that is not on level ground
+  int64_t delay_ = 0, steps_ = 0;
+  std::vector<double> under_way_;         // ring of the last 1 + delay commands
+  std::map<std::string, double> ground_;  // m, of each sole that is not on level ground
 };
 
 // A controller in memory of its own, and one millisecond of the closed loop.
