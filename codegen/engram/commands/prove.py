@@ -28,6 +28,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument(
         "--case", nargs="+", default=[], choices=[case.name for case in walk.CASES], help="of --task walk (default: all)"
     )
+    parser.add_argument("--walks", type=int, default=20, help="of --task walk, in each case (default: 20; --quick: 2)")
     parser.add_argument("--seed", type=int, default=1, help="of headings, phases and sides (default: 1)")
     parser.add_argument("--quick", action="store_true", help="a few seconds of each")
     parser.add_argument(
@@ -43,8 +44,10 @@ def run(args: argparse.Namespace) -> int:
     """Exit code 0: all that is asked holds. 1: something does not. Raises InputError."""
     if args.robot != "talos" and args.task:
         raise InputError(f"{args.robot} does not walk: leave --task away, or `engram prove talos --task walk`")
+    if args.walks < 1:
+        raise InputError("--walks: at least 1")
     if args.task:
-        report = walk.prove(args.seed, args.quick, args.case, args.jobs)
+        report = walk.prove(args.seed, 2 if args.quick else args.walks, args.case, args.jobs)
     else:
         cycles = args.cycles if args.cycles is not None else 0 if args.quick else 100_000
         report = importlib.import_module(f"engram.prove.{args.robot}").prove(args.seed, args.quick, cycles, args.jobs)

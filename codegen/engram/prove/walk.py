@@ -99,10 +99,9 @@ def judge(report: Report, case: Case, runs: list[Series]) -> None:
     print(f"  {case.text:50} {told}", flush=True)
 
 
-def prove(seed: int, quick: bool, only: list[str], jobs: int = 1, stream: int = HELD_OUT) -> Report:
-    """Run the cases; `only` names some, empty: all. The seed draws commands, headings, times and sides, alike for every case."""
+def prove(seed: int, n: int, only: list[str], jobs: int = 1, stream: int = HELD_OUT) -> Report:
+    """Run `n` walks of each case, or of those in `only`. The seed draws commands, headings, times and sides."""
     report = Report("talos.walk")
-    n = 2 if quick else 20
     print(f"Talos walks {STEPS} steps with turns and side steps in MuJoCo, seed {seed}:")
     print(f"  {'':50}    falls  steps      landing   centre   torque      CPU us")
     print(f"  {'':50}           least  mean    max   of mass     most     p50   p99")
