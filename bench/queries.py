@@ -39,9 +39,10 @@ class Peer:
         self.model.fit(self.between, np.zeros((n, m)))  # inputs and Cholesky factor; the weights are the table's
         self.model.alpha_ = array["alpha"].reshape(n, pad(m))[:, :m].astype(float)
         self.mean = array["mean"][:m].astype(float)
-        # bytes and multiply-adds of a query: tab_knn.h, tab_gpr.h with the variance
+        # bytes of the table, of which a query reads, and multiply-adds: tab_knn.h (all inputs), tab_gpr.h with the variance (all)
         counts = {"knn": knn.entry["sizes"]["n"] * knn.entry["sizes"]["d"], "gpr": n * (sizes["d"] + m) + n * n // 2}
-        self.work = {kind: (tables[kind].entry["bytes"], count) for kind, count in counts.items()}
+        read = {"knn": 4 * counts["knn"], "gpr": gpr.entry["bytes"]}
+        self.work = {kind: (tables[kind].entry["bytes"], count, read[kind]) for kind, count in counts.items()}
 
     def draw(self) -> tuple[np.ndarray, np.ndarray]:
         """Inputs inside the tables' domain: samples, disturbed."""

@@ -335,7 +335,8 @@ class Bench:
         for name, samples in mine.items():
             self.figures.add("query", name, samples, theirs.get(name), holds, None)
             if name in peer.work:
-                self.facts(f"query.{name}", *peer.work[name], samples)
+                size, operations, read = peer.work[name]
+                self.facts(f"query.{name}", size, operations, samples, read)
 
     def learners(self) -> None:
         """Kinds of tables that the Panda's memory does not ask for, or not alone."""
@@ -364,12 +365,13 @@ class Bench:
                 self.facts(f"query.{rival.name}", table_bytes(rival.table), rival.operations, ours)
         print(NO_ALLOCATION)
 
-    def facts(self, name: str, size: int, operations: int, ours: Samples) -> None:
-        """Bytes that a query reads, its multiply-adds; how much of our time it takes to read as many bytes where they lie."""
+    def facts(self, name: str, size: int, operations: int, ours: Samples, read: int | None = None) -> None:
+        """Bytes, multiply-adds of a query; how much of our time it takes to read as many bytes as it does (default: all)."""
         from engram.engine import engine
 
-        limit = float(np.median(engine.read_us(size, 50)))
-        share = f"reading as many bytes takes {limit:.2f} us, {limit / ours.median:.0%} of our time"
+        read = size if read is None else read
+        limit = float(np.median(engine.read_us(read, 50)))
+        share = f"reading {read} bytes takes {limit:.2f} us, {limit / ours.median:.0%} of our time"
         print(f"    {size} bytes, {operations} multiply-adds, {2e-3 * operations / ours.median:.1f} GFLOP/s; {share}")
         self.figures.rows.append(
             {"id": f"bench.{name}.of_bandwidth", "value": limit / ours.median, "unit": "1", "n": len(ours.us), "gate": True}
@@ -407,7 +409,8 @@ class Bench:
                 for name, key in (("pytorch", "sample"), ("tuned", "sample_tuned"), ("teneva", "sample_teneva")):
                     if name in us:
                         self.figures.add("tt", f"{key}.{case.name(count)}", us["ours"], us[name], holds, None)
-                self.facts(f"tt.sample.{case.name(count)}", case.bytes_read(count), case.operations(count), us["ours"])
+                work = (sides.ours.bytes, case.operations(count), us["ours"], case.bytes_read(count))
+                self.facts(f"tt.sample.{case.name(count)}", *work)
         print(NO_ALLOCATION)
 
     def networks(self, worker) -> None:
