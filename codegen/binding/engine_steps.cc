@@ -32,7 +32,11 @@ class StepProblem : public Problem<TalosSteps::P, TalosSteps::N> {
       goal[i] = on_ground(goals.data() + 3 * i);
       swing[i] = (first + i) % 2;
     }
-    if (!steps_.plan(start, n, swing, goal)) throw nb::value_error("no posture stands on these feet: they are too far apart, or not finite");
+    switch (steps_.plan(start, n, swing, goal)) {
+      case StepsFault::kOverlap: throw nb::value_error("a foot stands on the other one: keep the soles apart");
+      case StepsFault::kNoPosture: throw nb::value_error("no posture stands on these feet: they are too far apart, or not finite");
+      case StepsFault::kNone: break;
+    }
     double x0[nx] = {};
     std::copy_n(steps_.stance(0), nq, x0);
     steps_.pose(x0, h());

@@ -21,6 +21,13 @@
 
 namespace engram {
 
+// Why steps cannot be planned.
+enum class StepsFault {
+  kNone,
+  kOverlap,    // a sole stands on the other one
+  kNoPosture,  // feet are too far apart for a posture, or not finite
+};
+
 // C: terms of a robot on two feet (TalosBody of loop_talos.h) under the numbers of its task.
 template <class C, int most_> class Steps {
  public:
@@ -49,8 +56,8 @@ template <class C, int most_> class Steps {
     for (int f = 0; f < 2; ++f) height_ -= 0.5 * foot_of(d, f).p[2];
   }
 
-  // From the feet at the start; foot[i] swings in step i, to goal[i]. count <= most. False if a posture cannot be found.
-  bool plan(const Placement (&start)[2], int count, const int* foot, const Placement* goal) {
+  // From the feet at the start; foot[i] swings in step i, to goal[i]. count <= most.
+  StepsFault plan(const Placement (&start)[2], int count, const int* foot, const Placement* goal) {
     count_ = count;
     for (int f = 0; f < 2; ++f) feet_[0][f] = start[f];
     for (int i = 0; i < count; ++i) {
@@ -60,12 +67,13 @@ template <class C, int most_> class Steps {
     }
     for (int i = 0; i <= count; ++i) {
       body_[i] = between(feet_[i]);
-      if (!stand(feet_[i], stance_[i])) return false;
+      if (overlap(feet_[i][0], feet_[i][1])) return StepsFault::kOverlap;
+      if (!stand(feet_[i], stance_[i])) return StepsFault::kNoPosture;
     }
     for (int i = 0; i < count; ++i)
       for (unsigned active = 1; active < 4; ++active) stance_torques<P>(stance_[i], active, torque_[i][active]);
     pendulum();
-    return true;
+    return StepsFault::kNone;
   }
 
   int count() const { return count_; }
@@ -167,6 +175,17 @@ template <class C, int most_> class Steps {
     q[3] = q[4] = 0.0;
     q[5] = std::sin(0.5 * yaw);
     q[6] = std::cos(0.5 * yaw);
+  }
+
+  // Do the soles' rectangles meet? Not if an axis of one of them separates them.
+  static bool overlap(const Placement& a, const Placement& b) {
+    const double turn = b.yaw - a.yaw, c = std::fabs(std::cos(turn)), s = std::fabs(std::sin(turn));
+    const double reach[2] = {Task::sole_half[0] * (1.0 + c) + Task::sole_half[1] * s, Task::sole_half[1] * (1.0 + c) + Task::sole_half[0] * s};
+    for (const Placement* axes : {&a, &b}) {
+      const double cx = std::cos(axes->yaw), sx = std::sin(axes->yaw), dx = b.p[0] - a.p[0], dy = b.p[1] - a.p[1];
+      if (!(std::fabs(cx * dx + sx * dy) < reach[0]) || !(std::fabs(-sx * dx + cx * dy) < reach[1])) return false;
+    }
+    return true;
   }
 
   // At rest with the centre of mass above the middle of the feet.

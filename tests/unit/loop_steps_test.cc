@@ -20,7 +20,7 @@ std::unique_ptr<Posed> two_steps() {
   const Placement start[2] = {{{0.0, 0.09, 0.0}, 0.1}, {{0.02, -0.09, 0.0}, -0.1}};
   const Placement goal[2] = {{{0.2, 0.1, 0.0}, 0.2}, {{0.4, -0.08, 0.0}, 0.3}};
   const int foot[2] = {0, 1};
-  EXPECT_TRUE(p->steps.plan(start, 2, foot, goal));
+  EXPECT_EQ(p->steps.plan(start, 2, foot, goal), StepsFault::kNone);
   double x0[TalosSteps::P::nx] = {};
   std::memcpy(x0, p->steps.stance(0), sizeof(double) * TalosSteps::R::nq);
   p->steps.pose(x0, p->h);
@@ -101,7 +101,22 @@ TEST(Steps, FeetOutOfReachAreRefused) {
   TalosSteps steps;
   const Placement start[2] = {{{0.0, 2.0, 0.0}, 0.0}, {{0.0, -2.0, 0.0}, 0.0}};
   const int foot[1] = {0};
-  EXPECT_FALSE(steps.plan(start, 1, foot, start));
+  EXPECT_EQ(steps.plan(start, 1, foot, start), StepsFault::kNoPosture);
+}
+
+TEST(Steps, AFootOnTheOtherOneIsRefused) {
+  TalosSteps steps;
+  const Placement start[2] = {{{0.0, 0.1, 0.0}, 0.0}, {{0.0, -0.1, 0.0}, 0.0}};
+  const int foot[1] = {0};
+  const auto goes = [&](double x, double y, double yaw) {
+    const Placement goal = {{x, y, 0.0}, yaw};
+    return steps.plan(start, 1, foot, &goal);
+  };
+  const double half[2] = {tasks::TalosStep::sole_half[0], tasks::TalosStep::sole_half[1]};
+  EXPECT_EQ(goes(0.0, -0.1, 0.0), StepsFault::kOverlap);
+  EXPECT_EQ(goes(0.0, -0.1 + 2.0 * half[1] - 1e-3, 0.0), StepsFault::kOverlap);
+  EXPECT_EQ(goes(0.0, -0.1 + 2.0 * half[1] + 1e-2, 0.0), StepsFault::kNone);
+  EXPECT_EQ(goes(0.0, -0.1 + 2.0 * half[1] + 1e-2, 0.4), StepsFault::kOverlap);  // its heel
 }
 
 }  // namespace

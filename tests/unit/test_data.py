@@ -125,16 +125,17 @@ def test_unsolved_task_is_recorded_not_kept(spec):
     assert len(rows["outcome"]) == 3 and not np.any(rows["outcome"] == reach.OK)
 
 
-def test_interrupt_keeps_finished_chunks(tmp_path, root):
+@pytest.mark.parametrize(("task", "folder"), [("panda reach", "panda_reach_lines"), ("talos step", "talos_step_left")])
+def test_interrupt_keeps_finished_chunks(tmp_path, root, task, folder):
     environment = {**os.environ, "PYTHONPATH": str(root / "codegen")}
-    command = [sys.executable, "-m", "engram", "data", "panda", "reach", "--n", "2000", "--workers", "1", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "engram", "data", *task.split(), "--n", "2000", "--workers", "1", "--out", str(tmp_path)]
     process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True, start_new_session=True)
     deadline = time.monotonic() + 60.0
-    while not list(tmp_path.glob("panda_reach_lines/*.npz")) and time.monotonic() < deadline:
+    while not list(tmp_path.glob(f"{folder}/*.npz")) and time.monotonic() < deadline:
         time.sleep(0.05)
     os.killpg(process.pid, signal.SIGINT)  # what the terminal does
     _, err = process.communicate(timeout=60)
     assert process.returncode == 130 and "interrupted" in err and "Traceback" not in err
-    kept = list(tmp_path.glob("panda_reach_lines/*.npz"))
+    kept = list(tmp_path.glob(f"{folder}/*.npz"))
     assert kept and all(np.load(path)["outcome"].size for path in kept)
-    assert not list(tmp_path.glob("panda_reach_lines/*.part"))
+    assert not list(tmp_path.glob(f"{folder}/*.part"))

@@ -106,6 +106,9 @@ def test_tasks_stay_within_their_ranges_and_depend_on_seed_foot_and_number_alone
         ([[0, np.nan, 0], [0, -0.1, 0]], [[0, 0.1, 0]], 0, "not finite"),
         ([[0, 0.1, 0], [0, -0.1, 0]], [[0, 0.1, 0]] * 4, 0, "expected 1 .. 3 steps"),
         ([[0, 0.1, 0], [0, -0.1, 0]], [[0, 0.1, 0]], 2, "first"),
+        ([[0, 0.1, 0], [0, -0.1, 0]], [[1.5, 0.1, 0]], 0, "too far apart"),
+        ([[0, 0.1, 0], [0, -0.1, 0]], [[0.05, -0.1, 0.2]], 0, "on the other one"),
+        ([[0, 0.1, 0], [0, -0.1, 0]], [[0.2, 0.1, 0], [0.2, 0.1, 0]], 0, "on the other one"),
     ],
 )
 def test_bad_feet_are_refused(problem, feet, goals, first, what):
@@ -120,6 +123,10 @@ def test_a_damaged_or_foreign_data_set_is_one_message(tmp_path):
     step_set.make(2, 9, 1, tmp_path)
     whole = path.read_bytes()
     path.write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match="cannot be read"):
+        step_set.load(path)
+    middle = len(whole) // 2
+    path.write_bytes(whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :])
     with pytest.raises(InputError, match="cannot be read"):
         step_set.load(path)
     path.write_bytes(whole)
@@ -146,3 +153,21 @@ def test_the_short_curves_fall():
     found = {f["id"]: f["value"] for f in json.loads((BUILD / "figures" / "study.9.1.json").read_text(encoding="utf-8"))}
     after = {name: found.get(f"study.9.1.excess.{name}.iteration1", np.inf) for name in ("cold", "planner", "knn", "gmr", "gpr")}
     assert after["gpr"] < after["gmr"] < after["knn"] < after["cold"] and after["gpr"] < after["planner"]
+
+
+def test_no_accepted_seed_is_worse_than_the_shifted_plan_and_random_tables_do_no_harm():
+    """Row 9.2: inside the domain, at its edge and outside; tables of random numbers have a valid digest."""
+    assert main(["study", "9.2", "--quick"]) == 0
+    found = {f["id"]: f["value"] for f in json.loads((BUILD / "figures" / "study.9.2.json").read_text(encoding="utf-8"))}
+    assert all(found[f"study.9.2.worse.{where}"] == 0 for where in ("inside", "edge", "outside"))
+    assert found["study.9.2.taken.inside"] > 0.9  # or nothing was at stake
+    random = [key for key in found if key.startswith("study.9.2.success.random")]
+    assert len(random) == 4 and all(found[key] == found["study.9.2.success.shift"] for key in random)
+
+
+def test_a_memory_grows_by_what_it_knows_least():
+    """Row 9.3: after two rounds both memories are better than before."""
+    assert main(["study", "9.3", "--quick"]) == 0
+    found = {f["id"]: f["value"] for f in json.loads((BUILD / "figures" / "study.9.3.json").read_text(encoding="utf-8"))}
+    for name in ("random", "active"):
+        assert found[f"study.9.3.subopt1.{name}120"] < 0.7 * found[f"study.9.3.subopt1.{name}40"]

@@ -32,7 +32,7 @@ class Settings:
 
     path: int = 40  # coefficients of dq(t)
     torque: int = 64  # of u(t)
-    samples: int = 512  # inducing samples of the regression
+    samples: int = 880  # inducing samples of the regression, half of them steps from rest to rest
     stretch: float = 1.3  # of the length scales of the largest likelihood: the errors of float32 are smaller
     noise: float = 1e-4
     basis_steps: int = 500  # of each kind and foot, for the PCA
@@ -246,7 +246,10 @@ class Regression:
 
 def fit_regression(x: np.ndarray, z: np.ndarray, length: np.ndarray, settings: Settings) -> Regression:
     """Deterministic training conditional (Quinonero-Candela, Rasmussen, JMLR 2005): alpha = (K_mn K_nm + s K_mm)^-1 K_mn z."""
-    chosen = pivots(x, length, min(settings.samples, len(x)))
+    walking = x[:, [FROM_WALK, INTO_WALK]].any(axis=1)
+    kinds = [rows for rows in (np.flatnonzero(~walking), np.flatnonzero(walking)) if len(rows)]
+    share = settings.samples // len(kinds)
+    chosen = np.concatenate([rows[pivots(x[rows], length, min(share, len(rows)))] for rows in kinds])
     inducing = np.asarray(x[chosen], np.float32).astype(float)
     K, Kmm = kernel(inducing, x, length), kernel(inducing, inducing, length)
     mean = z.mean(axis=0)
@@ -254,6 +257,7 @@ def fit_regression(x: np.ndarray, z: np.ndarray, length: np.ndarray, settings: S
     return Regression(inducing, length, settings.noise, alpha, mean)
 
 
+FROM_WALK, INTO_WALK = 12, 13  # of the features
 POSES = ("start", "goal", "previous", "next")
 INPUTS = [(f"{what}_{axis}", "rad" if axis == "yaw" else "m") for what in POSES for axis in ("x", "y", "yaw")]
 INPUTS += [("from_walk", "1"), ("into_walk", "1"), ("foot", "1")]

@@ -16,9 +16,9 @@ from engram.data.step_set import StepData
 from engram.data.steps import WALKS
 from engram.engine import engine
 from engram.learn.gpr import kernel_matrix
-from engram.learn.steps import StepTables, fit_regression, length_scales
+from engram.learn.steps import FROM_WALK, INTO_WALK, StepTables, fit_regression, length_scales
 from engram.study.report import Report
-from engram.study.steps import FROM_WALK, INTO_WALK, SETTINGS, TESTED, Tested, draw_tested, learnt_from, load_sets
+from engram.study.steps import SETTINGS, TESTED, Tested, draw_tested, learnt_from, load_sets
 
 START, ADDED, ROUNDS, POOL = 40, 40, 8, 300  # steps of both feet together; tasks that are asked in every round
 RUNS = 3  # of both, from other first steps

@@ -177,7 +177,7 @@ def run(row: str, quick: bool) -> None:
     sets, tested = load_sets(quick), draw_tested(20 if quick else TESTED)
     learners = learnt_from(quick)
     curves = against_iteration(report, learners, tested)
-    samples = against_samples(sets, tested, SAMPLES[:1] if quick else SAMPLES)
+    samples = against_samples(sets, tested, () if quick else SAMPLES)
     sizes = against_bytes(learners.tables, tested, INDUCING[1:3] if quick else INDUCING)
     against(report, "samples", samples)
     against(report, "inducing", sizes)

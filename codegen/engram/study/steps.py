@@ -18,7 +18,7 @@ from engram.emit import Knn, Table
 from engram.engine import engine
 from engram.learn.mixture import condition, fit_gaussian, mixture_table
 from engram.learn.step_fit import split
-from engram.learn.steps import INPUTS, Coded, Settings, Step, StepTables, fit, steps_of
+from engram.learn.steps import FROM_WALK, INPUTS, INTO_WALK, Coded, Settings, Step, StepTables, fit, steps_of
 from engram.paths import BUILD
 from engram.study.report import Report
 
@@ -32,7 +32,6 @@ THESIS = {  # learner: trajectory error (rad), contact error (m), raw and refine
 NQ, NV = engine.talos.nq, engine.talos.nv
 SETTINGS = Settings()
 MIXTURE_SAMPLES, MIXTURE_COMPONENTS = 1000, 12
-FROM_WALK, INTO_WALK = 12, 13  # of the features
 VARIED = [0, 1, 2, 3, 4, 5, 14]  # features that differ among single steps
 JITTER = 1e-3  # of the mixture's inputs: the foot is 0 or 1, of which no Gaussian has a width
 
@@ -347,9 +346,10 @@ def walks(report: Report, quick: bool, count: int) -> None:
         "cold_with_rests": "", "memory_with_rests": "",
     }  # fmt: skip
     counts = {key: Count.empty() for key in labels}
-    for between, suffix, part in ((engine.TalosSteps.between, "", list), (rest, "_with_rests", alone)):
+    gaits = ((engine.TalosSteps.between, "", list, count), (rest, "_with_rests", alone, -(-count // 4)))
+    for between, suffix, part, walked in gaits:
         problem = engine.TalosSteps(between=between)
-        for i in range(count):
+        for i in range(walked):
             feet, goals, first = steps.draw_walk(SEED, i)
             problem.set(feet, goals, first)
             planned = problem.planned()
