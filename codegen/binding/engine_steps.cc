@@ -10,18 +10,6 @@
 namespace engram::binding {
 namespace {
 
-// True if two soles lie on one another: no axis of either separates them.
-bool overlap(const Placement& a, const Placement& b) {
-  constexpr double kHalf[2] = {0.1, 0.06};  // m, of a sole: models/talos/robot.toml
-  const double d[2] = {b.p[0] - a.p[0], b.p[1] - a.p[1]}, turned = b.yaw - a.yaw;
-  for (int i = 0; i < 4; ++i) {
-    const double yaw = (i < 2 ? a : b).yaw + (i % 2 == 0 ? 0.0 : 0.5 * M_PI);
-    const double apart = std::fabs(std::cos(yaw) * d[0] + std::sin(yaw) * d[1]), c = std::fabs(std::cos(turned)), s = std::fabs(std::sin(turned));
-    if (!(apart <= kHalf[i % 2] + c * kHalf[i % 2] + s * kHalf[1 - i % 2])) return false;  // not finite: another message tells
-  }
-  return true;
-}
-
 class StepProblem : public Problem<TalosSteps::P, TalosSteps::N> {
   using R = TalosSteps::R;
   static constexpr int nq = R::nq;
@@ -39,14 +27,10 @@ class StepProblem : public Problem<TalosSteps::P, TalosSteps::N> {
     const auto on_ground = [](const double* p) { return Placement{{p[0], p[1], 0.0}, p[2]}; };
     const Placement start[2] = {on_ground(feet.data()), on_ground(feet.data() + 3)};
     Placement goal[TalosSteps::most];
-    Placement now[2] = {start[0], start[1]};
     int swing[TalosSteps::most];
-    if (overlap(now[0], now[1])) throw nb::value_error("feet: the soles lie on one another; 0.13 m between them is enough");
     for (int i = 0; i < n; ++i) {
+      goal[i] = on_ground(goals.data() + 3 * i);
       swing[i] = (first + i) % 2;
-      now[swing[i]] = goal[i] = on_ground(goals.data() + 3 * i);
-      if (overlap(now[0], now[1]))
-        throw nb::value_error(("goals: step " + std::to_string(i + 1) + " lands on the other foot; 0.13 m between them is enough").c_str());
     }
     switch (steps_.plan(start, n, swing, goal)) {
       case StepsFault::kOverlap: throw nb::value_error("a foot stands on the other one: keep the soles apart");
