@@ -165,7 +165,7 @@ int main(int argc, char** argv) {
     const int64_t start = plant.utime;
     std::vector<double> rows;
     double worst = 0.0, over = 0.0;
-    int remembered = 0;  // cycles that the memory has won
+    int remembered = 0, asked = 0, worse = 0;  // cycles that the memory has won; answered; won though its merit was above the shifted plan's
     while (ready && plant.utime < start + static_cast<int64_t>(1e6 * kAlone) && !fallen) {
       const double t = 1e-6 * static_cast<double>(plant.utime - start);
       if (plant.utime % 10000 == 0) {
@@ -184,7 +184,10 @@ int main(int argc, char** argv) {
       step();
       if (ticked) {
         cycles.push_back(controller.cycle().total_us);
-        remembered += controller.cycle().winner == ENGRAM_CANDIDATE_KNN;
+        const engram_cycle& c = controller.cycle();
+        remembered += c.winner == ENGRAM_CANDIDATE_KNN;
+        asked += c.nguess == 2;
+        worse += c.winner == ENGRAM_CANDIDATE_KNN && !(c.merit[1] <= c.merit[0]);
         queries.push_back(controller.cycle().asked_us[ENGRAM_CANDIDATE_KNN]);
         const double row[2] = {cycles.back(), queries.back()};
         if (clocked != nullptr) std::fwrite(row, sizeof row, 1, clocked);
@@ -197,8 +200,8 @@ int main(int argc, char** argv) {
     if (success && log != nullptr) std::fwrite(rows.data(), sizeof(double), rows.size(), log);
     successes += success ? 1 : 0;
     ++done;
-    std::printf("motion %d side %d speed %.2f ready %d success %d error_m %.4f touched %d over_mrad %.2f fallen %d refused %d remembered %d hand %.3f %.3f %.3f\n", n,
-                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, worst, touched, 1e3 * over, fallen, refused, remembered, hand[0], hand[1], hand[2]);
+    std::printf("motion %d side %d speed %.2f ready %d success %d error_m %.4f touched %d over_mrad %.2f fallen %d refused %d remembered %d asked %d worse %d hand %.3f %.3f %.3f\n", n,
+                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, worst, touched, 1e3 * over, fallen, refused, remembered, asked, worse, hand[0], hand[1], hand[2]);
     std::fflush(stdout);
   }
   if (log != nullptr) std::fclose(log);

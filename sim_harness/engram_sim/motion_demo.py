@@ -18,6 +18,7 @@ from engram_sim.pair import Pair, Progress, plant_option, private_port, scene
 from engram_sim.results import Run, read_run, wilson
 
 MODE = "memory"  # what seeds the solver: the shifted plan, and a memory where the robot has one for the task
+BESIDE = {"talos_pole": ("shift", "cold")}  # run beside it, where a memory is asked at every period
 LOG_EVERY = 40  # plant steps between two states of the log
 LOG_FULL = 10.0  # s of the log with every state
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}
@@ -34,25 +35,31 @@ def demo(args: argparse.Namespace, folder: Path) -> int:
     script.write(path)
     print(f"{script.kind:<8}{script.parts} parts, seed {args.seed}: {relative(path)}")
 
-    progress, outcomes = Progress(script.parts, "run   "), []
+    for mode in (MODE, *BESIDE.get(f"{args.robot}_{args.task}", ())):
+        if not run_mode(args, folder, mode, script, path):
+            return 1
+    header = {"robot": args.robot, "task": args.task, "seed": args.seed, "clock": args.clock, "site": script.site}
+    return finish(folder, header, args.video, args.figures, start)
+
+
+def run_mode(args: argparse.Namespace, folder: Path, mode: str, script: scenarios.Script, path: Path) -> bool:
+    """One run of the script at `path` into folder/mode. False if it did not come to its end, which is said."""
+    progress, outcomes = Progress(script.parts, f"{mode:<8}"[:7]), []
 
     def ended(part: int, parts: int, outcome: str, seconds: float) -> None:
         outcomes.append(outcome)
         progress.show(part, f"{outcomes.count('ok')}/{part} ok")
 
-    pair = Pair(folder / MODE, path, scene(args.robot, args.task), private_port(), MODE, f"{args.robot}_{args.task}", script.kind)
+    pair = Pair(folder / mode, path, scene(args.robot, args.task), private_port(), mode, f"{args.robot}_{args.task}", script.kind)
     pair.clock, pair.controller = args.clock, args.controller
     options = [word for option in args.plant_option for word in plant_option(option)]
     pair.plant_options = ["--log-full", str(LOG_FULL), "--log-every", str(LOG_EVERY), *script.plant_options, *options]
     code = pair.run(ended)
     if "other task" in last_line(pair.folder / "controller.txt"):
         print("\ndemo: the controller refused the tasks, it was built from another task.h; build it again: make setup")
-        return 1
-    if code != 0:
+    elif code != 0:
         print(f"\ndemo: ended with exit code {code}:\n{pair.last_words()}")
-        return 1
-    header = {"robot": args.robot, "task": args.task, "seed": args.seed, "clock": args.clock, "site": script.site}
-    return finish(folder, header, args.video, args.figures, start)
+    return code == 0
 
 
 def finish(folder: Path, header: dict[str, Any], seconds: float, figures_folder: Path, start: float | None = None) -> int:
@@ -64,19 +71,23 @@ def finish(folder: Path, header: dict[str, Any], seconds: float, figures_folder:
     motion = Motion(run, spec.robot, header["site"])
     for part in parts(run):
         part.update(walking.measure(motion, part))
+    names = BESIDE.get(f"{header['robot']}_{header['task']}", ())
+    beside = [read_run(mode, folder / mode) for mode in names if (folder / mode / "results.json").is_file()]
     drawn = folder / "demo.mp4"
     if seconds > 0:
-        clips = choose(run, seconds)
+        clips = choose(run, seconds, whole=bool(beside))
         video.draw(
-            [run],
-            [clip_line(*clip) for clip in clips],
+            [run, *beside],
+            [clip_line(*clip) + "".join(panel(other, clip) for other in beside) for clip in clips],
             write_shown_scene(spec),
             drawn,
             header["site"],
-            title=f"{spec.robot.name} {spec.name}",
+            title="" if beside else f"{spec.robot.name} {spec.name}",
         )
         video.still(drawn, folder / "demo.png", min(2.0, seconds / 2.0))
     summary = header | summarize(run)
+    if beside:
+        summary["beside"] = {other.mode: sum(part["success"] for part in parts(other)) / len(parts(other)) for other in beside}
     if start is not None:
         summary["wall_s"] = round(time.monotonic() - start, 1)
     (folder / "summary.json").write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
@@ -165,6 +176,8 @@ def figures(name: str, run: Run, summary: dict[str, Any]) -> list[dict[str, Any]
     for part in parts(run):
         if "pace" in part:
             add(f"pace.{part['name']}", part["pace"][0], "m/s", 1)
+    for mode, success in summary.get("beside", {}).items():
+        add(f"success.{mode}", success, "1", n)
     for phase in ("linearize", "backward", "rollout", "total"):
         times = summary.get(f"{phase}_us", {})
         for kind in PERCENTILES:
@@ -172,14 +185,14 @@ def figures(name: str, run: Run, summary: dict[str, Any]) -> list[dict[str, Any]
     return records
 
 
-def choose(run: Run, seconds: float) -> list[tuple[str, float, float, str]]:
-    """Title, begin, end (s) and outcome of clips of about `seconds` in all; failed parts come first."""
+def choose(run: Run, seconds: float, whole: bool = False) -> list[tuple[str, float, float, str]]:
+    """Title, begin, end (s) and outcome of clips of about `seconds` in all; failed parts come first; `whole`: to their ends."""
     done = sorted(parts(run), key=lambda part: part["success"])
     kinds: dict[str, dict[str, Any]] = {}
     for part in done:  # one of each kind: pushes differ by heading only
         kinds.setdefault(part["name"].partition("_at_")[0] if "episodes" in run.plant else part["name"], part)
     chosen, total = [], 0.0
-    longest = max(4.0, seconds / max(1, min(len(kinds), 8)))
+    longest = np.inf if whole else max(4.0, seconds / max(1, min(len(kinds), 8)))
     for name, part in kinds.items():
         end = min(part["t_end_s"], part["t_start_s"] + longest)
         if total >= seconds:
@@ -195,6 +208,15 @@ def clip_line(title: str, begin: float, end: float, outcome: str) -> str:
     return f"{end - begin + video.AFTER:.3f};{title};{begin:.3f};{end:.3f};{outcome}"
 
 
+def panel(run: Run, clip: tuple[str, float, float, str]) -> str:
+    """The same part in another mode, for a panel beside; where the robot fell, it was over earlier."""
+    title, begin, end, said = clip
+    part = next(part for part in parts(run) if part["name"].replace("_", " ") == title)
+    outcome = "ok" if part["success"] else part["reason"].replace("+", ", ")
+    over = min(part["t_start_s"] + end - begin, part["t_end_s"])
+    return f";{part['t_start_s']:.3f};{over:.3f};{outcome if said else ''}"
+
+
 def print_summary(summary: dict[str, Any], run: Run) -> None:
     """The run on one screen."""
     print(f"\n{summary['robot']} {summary['task']}, seed {summary['seed']}, {summary['sim_s']:.0f} s of plant time")
@@ -205,4 +227,5 @@ def print_summary(summary: dict[str, Any], run: Run) -> None:
         spread = ", ".join(f"{kind} {1e-3 * times[kind]:.2f}" for kind in PERCENTILES)
         print(f"\nCPU time of a cycle (ms): {spread}; {times['n']} cycles")
     torque = f"largest torque {100 * summary['torque_share_max']:.1f} % of its limit"
-    print(f"{summary['successes']} of {summary['parts']} ok, {torque}\n")
+    beside = "".join(f"; {mode} {100 * share:.0f} %" for mode, share in summary.get("beside", {}).items())
+    print(f"{summary['successes']} of {summary['parts']} ok{beside}, {torque}\n")

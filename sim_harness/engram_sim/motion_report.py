@@ -55,6 +55,9 @@ def times_table(summary: dict[str, Any]) -> str:
     return html_table(rows) if len(rows) > 1 else ""
 
 
+MODES = {"shift": "the shifted plan alone", "cold": "a cold start at every new target"}
+
+
 def base_path(motion: Motion) -> str:
     """Height of the base and its way over ground, over plant time."""
     states = motion.messages["ENGRAM_STATE"]
@@ -73,6 +76,8 @@ def write(folder: Path, motion: Motion, done: list[dict[str, Any]], summary: dic
     """Write report.html into `folder` and return its path."""
     robot, task = html.escape(summary["robot"]), html.escape(summary["task"])
     cards = [(f"{summary['successes']} of {summary['parts']}", "parts of the script are ok")]
+    for mode, share in summary.get("beside", {}).items():
+        cards.append((f"{100 * share:.0f} %", f"of the parts are ok with {MODES[mode]}"))
     if "total_us" in summary:
         cards.append((f"{1e-3 * summary['total_us']['p50']:.2f} ms", "CPU time of a cycle, median (period 10 ms)"))
     cards.append((f"{100 * summary['torque_share_max']:.0f} %", "of its limit is the largest torque"))
