@@ -52,8 +52,8 @@ def spread_out(x: np.ndarray, gain: np.ndarray, length: np.ndarray, count: int) 
 class Grower:
     """A memory of single steps that grows by rows of one data set."""
 
-    def __init__(self, sets: list[StepData], tables: StepTables):
-        self.tables, self.problem = tables, engine.TalosSteps()
+    def __init__(self, sets: list[StepData], tables: StepTables, pool: int):
+        self.tables, self.problem, self.pool = tables, engine.TalosSteps(), pool
         coded = tables.coded
         single = ~coded.x[:, [FROM_WALK, INTO_WALK]].any(axis=1)
         self.x, self.z, self.length = coded.x[single], coded.z[single], length_scales(coded, SETTINGS)
@@ -71,7 +71,7 @@ class Grower:
     def worst(self, rows: list[int], rng: np.random.Generator) -> list[int]:
         """Steps to add where the memory of `rows` has most to gain."""
         memory = self.memory(rows)
-        pool = rng.choice(np.setdiff1d(np.arange(len(self.x)), rows), POOL, replace=False)
+        pool = rng.choice(np.setdiff1d(np.arange(len(self.x)), rows), self.pool, replace=False)
         gain = np.array([after_one(self.problem, memory, self.tasks[row])[1] for row in pool])
         return [int(pool[i]) for i in spread_out(self.x[pool], gain, self.length, ADDED)]
 
@@ -116,7 +116,11 @@ def run(row: str, quick: bool) -> None:
     """Both curves, and how many samples the active memory needs for what the random one has at the end."""
     report = Report(row, "active sampling: steps where the memory is worst, against steps at random (thesis, 4.4 and 9.2)")
     sets, tested = load_sets(quick), draw_tested(20 if quick else TESTED)
-    grower, rounds, runs = Grower(sets, learnt_from(quick).tables), 3 if quick else ROUNDS, 1 if quick else RUNS
+    grower, rounds, runs = (
+        Grower(sets, learnt_from(quick).tables, POOL // 3 if quick else POOL),
+        3 if quick else ROUNDS,
+        1 if quick else RUNS,
+    )
     curves = {}
     for name, add in (("random", grower.anywhere), ("active", grower.worst)):
         found = [grow(grower, add, tested, rounds, i) for i in range(runs)]

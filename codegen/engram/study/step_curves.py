@@ -33,7 +33,7 @@ from engram.study.steps import (
 
 ITERATIONS = 8
 SAMPLES = (100, 300, 1000)  # steps of a foot, half as many walks
-INDUCING = (32, 64, 128, 256, 512)  # samples of the regression: bytes
+INDUCING = (64, 128, 256, 512, 880)  # samples of the regression: bytes
 TRAIN_POINTS, TRAIN_RANK = 24, 24
 HIDDEN, EPOCHS = 64, 100
 LEARNERS = ("knn", "gmr", "mlp", "tt", "gpr")
@@ -50,12 +50,12 @@ def excess(problem: engine.TalosSteps, task: Tested, xs: np.ndarray, us: np.ndar
 class Contest:
     """The learners, fitted on one database."""
 
-    def __init__(self, learners: Learners):
+    def __init__(self, learners: Learners, epochs: int):
         self.learners, coded = learners, learners.tables.coded
         learners.add_neighbour()
         learners.add_mixture()
         x, width = coded.x, coded.z.shape[1]
-        net = fit_ensemble(x, coded.z, hidden=HIDDEN, epochs=EPOCHS)
+        net = fit_ensemble(x, coded.z, hidden=HIDDEN, epochs=epochs)
         learners.add("mlp", network_table(net, **shared(coded)))
         regression = learners.tables.regression
         features = VARIED[:6]
@@ -79,9 +79,9 @@ class Contest:
         return found["xs"], found["us"]
 
 
-def against_iteration(report: Report, learners: Learners, tested: list[Tested]) -> dict[str, np.ndarray]:
+def against_iteration(report: Report, learners: Learners, tested: list[Tested], epochs: int) -> dict[str, np.ndarray]:
     """Median excess of cost after each iteration."""
-    problem, contest = engine.TalosSteps(), Contest(learners)
+    problem, contest = engine.TalosSteps(), Contest(learners, epochs)
     rows = {name: [] for name in ("cold", "shift", "planner", *LEARNERS, "ensemble")}
     chosen = dict.fromkeys(("shift", *LEARNERS), 0)
     for task in tested:
@@ -176,9 +176,9 @@ def run(row: str, quick: bool) -> None:
     report = Report(row, "steps of Talos: cost against iteration, quality against samples and bytes (thesis, section 8.4)")
     sets, tested = load_sets(quick), draw_tested(20 if quick else TESTED)
     learners = learnt_from(quick)
-    curves = against_iteration(report, learners, tested)
+    curves = against_iteration(report, learners, tested, EPOCHS // 5 if quick else EPOCHS)
     samples = against_samples(sets, tested, () if quick else SAMPLES)
-    sizes = against_bytes(learners.tables, tested, INDUCING[1:3] if quick else INDUCING)
+    sizes = against_bytes(learners.tables, tested, INDUCING[2:3] if quick else INDUCING)
     against(report, "samples", samples)
     against(report, "inducing", sizes)
     draw_curves(report, curves, samples, sizes)
