@@ -31,7 +31,7 @@ def demo(args: argparse.Namespace) -> int:
         raise InputError(f"unknown robot '{args.robot}'; {closest(args.robot, known_robots())}")
     if not known_tasks(args.robot):
         raise InputError(f"robot '{args.robot}' has no task; write models/{args.robot}/<task>/task.toml")
-    args.task = args.task or known_tasks(args.robot)[0]
+    args.task = args.task or ("stand" if "stand" in known_tasks(args.robot) else known_tasks(args.robot)[0])
     if open_task(args.robot, args.task).data["kind"] == "reach":
         return reach_demo(args)
     return motion_demo.demo(args, run_folder(args.out))

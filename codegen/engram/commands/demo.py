@@ -18,7 +18,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     """Arguments of `engram demo`."""
     parser = subparsers.add_parser("demo", help=__doc__, description=__doc__, epilog=EXAMPLES)
     parser.add_argument("--robot", default="panda", help="robot to run (default: panda)")
-    parser.add_argument("--task", help="task to run (default: the robot's only one)")
+    parser.add_argument("--task", help="task to run (default: stand, or the first by name)")
     parser.add_argument("--seed", type=int, default=1, help="of the task series; none repeats the training data (default: 1)")
     parser.add_argument("--jumps", type=int, help="jumps, way points or episodes (default: 300 jumps, or all)")
     parser.add_argument(
