@@ -52,7 +52,7 @@ STUDIES = {
     "6.5": Study("panda.pick", "pick and place, Panda with table, box and shelf, d = 62 (table 7.3)",
                  Recipe(points=(20, 48), weights=(42, 8), fitted=True, rank=16, scale=5.0, enrich=16, sweeps=1, seeds=6,
                         alpha=0.97, spread=True, starts=2000, start_cost=0.16, start_evaluations=800, evaluations=800),
-                 60, 200, slice(6, 20), 25),
+                 100, 400, slice(6, 20), 25),
 }  # fmt: skip
 
 
