@@ -28,7 +28,7 @@ demo: setup
 test: setup
 	@.venv/bin/python scripts/test.py $(ARGS)
 
-bench: export TARGETS = engram_bench engram_bench_single query_bench _engine
+bench: export TARGETS = engram_bench engram_bench_single query_bench count_heap _engine
 bench: setup
 	@scripts/setup.sh torch || echo "bench:     the rows beside PyTorch are left out"
 	@.venv/bin/python bench/run.py $(ARGS)

@@ -1,13 +1,15 @@
 // The memory's queries on the Panda's tables: numbers for the equality gate, and times.
 //
 //   query_bench compare QUERIES    k-NN and regression at given inputs
-//   query_bench time QUERIES N     N passes over the inputs: each table, and the whole query of the memory [us per query]
+//   query_bench time QUERIES N     N passes over the inputs: each table, and the whole query of the memory [us per query], and the
+//                                  calls of the allocators in all of them; "planted": those of a new and a delete, which are 2
 //
 // QUERIES: per query the features of the k-NN (16), then those of the regression (17). Writes one JSON object.
 #include "bench/stopwatch.h"
 #include "controller/memory/memory_query.h"
 #include "tables/panda_reach/tables.h"
 #include "tables/panda_reach/task.h"
+#include "tests/support/count_heap.h"
 
 #include <memory>
 #include <string>
@@ -49,6 +51,15 @@ void compare(const std::vector<Query>& queries, Scratch& s) {
   report.list("variance", variance);
 }
 
+// Calls of the allocators in f
+template <class F> double allocations(F&& f) {
+  const long long before = calls;
+  counting = true;
+  f();
+  counting = false;
+  return double(calls - before);
+}
+
 // The task whose features these are: third axis and first axis give the rotation.
 ReachTarget target_of(const double* near) {
   const Vec3<double> z = constant3<double>(near + nq + 3).normalized();
@@ -67,14 +78,22 @@ ReachTarget target_of(const double* near) {
 void time(const std::vector<Query>& queries, int passes, Scratch& s) {
   bench::Report report;
   const auto measure = [&](const char* name, auto query) {
+    double allocated = 0;
     const auto pass = [&] {
-      for (const Query& q : queries) {
-        query(q);
-        bench::keep(s);
-      }
+      allocated += allocations([&] {
+        for (const Query& q : queries) {
+          query(q);
+          bench::keep(s);
+        }
+      });
     };
     report.list(name, bench::sample_us(passes, pass, double(queries.size())));
+    report.number(("allocations." + std::string(name)).c_str(), allocated);
   };
+  report.number("allocations.planted", allocations([] {
+    int* volatile number = new int(1);
+    delete number;
+  }));
   for (int k = 0; k <= N; ++k) s.t[k] = k * Task::dt;
   measure("knn", [&](const Query& q) { tab_knn_query(kTables.knn, q.near, kNearest, s.index, s.distance2); });
   measure("gpr", [&](const Query& q) { tab_gpr_query(kTables.gpr, q.between, s.mean, &s.variance); });

@@ -18,6 +18,7 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import heap
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -32,7 +33,6 @@ COST_TOLERANCE = 1e-8
 ROUNDING = 2.0**-24
 RECURSION_SINGLE = 30 * ROUNDING
 COST_SINGLE = 100 * ROUNDING
-NO_ALLOCATION = "  allocations: no allocator is linked into the evaluators (tests/unit/test_symbols.py)"
 # The stopping criterion may cross its threshold one iteration apart.
 ITERATION_TOLERANCE = 1
 
@@ -92,7 +92,6 @@ def build_peers(folder: Path) -> None:
 def export_models(folder: Path) -> None:
     from export_models import load, text
 
-    folder.mkdir(parents=True, exist_ok=True)
     for robot in sorted({anchor.robot for anchor in PROBLEMS.values()}):
         (folder / f"{robot}.txt").write_text(text(robot, *load(robot)))
 
@@ -209,11 +208,10 @@ class Bench:
         self.rounds, self.n = rounds, n
         self.figures = Figures()
         self.all_hold = True
-        for program in (self.ours, self.single):
+        for program in (self.ours, self.single, self.ours.with_name("query_bench"), self.ours.with_name("libcount_heap.so")):
             if not program.exists():
-                raise SystemExit(f"error: {program} is not built\n  mend: ninja -C {build} {program.name}")
-        build_peers(self.peers)
-        export_models(self.inputs)
+                raise SystemExit(f"error: {program} is not built\n  mend: ninja -C {build} {program.stem.removeprefix('lib')}")
+        self.inputs.mkdir(parents=True, exist_ok=True)
 
     def numbers(self, name: str, *arrays: np.ndarray) -> Path:
         path = self.inputs / f"{name}.txt"
@@ -324,7 +322,8 @@ class Bench:
                 "queries, in units of their own", queries.errors(peer, run_json(program, "compare", file), near, between), 1.0
             )
             self.all_hold &= holds
-            mine = {name: Samples(np.array(us)) for name, us in run_json(program, "time", file, max(20, self.n // 10)).items()}
+            found = run_json(program, "time", file, max(20, self.n // 10))
+            mine = {name: Samples(np.array(us)) for name, us in found.items() if isinstance(us, list)}
             theirs = {
                 "knn": Samples(queries.one_by_one(peer.knn, near)),
                 "gpr": Samples(queries.one_by_one(peer.gpr, between)),
@@ -337,6 +336,8 @@ class Bench:
             if name in peer.work:
                 size, operations, read = peer.work[name]
                 self.facts(f"query.{name}", size, operations, samples, read)
+            calls = found[f"allocations.{name}"] if found["allocations.planted"] == heap.PLANTED else None
+            self.allocations(f"query.{name}", calls, len(samples.us) * len(near))
 
     def learners(self) -> None:
         """Kinds of tables that the Panda's memory does not ask for, or not alone."""
@@ -351,7 +352,7 @@ class Bench:
         with threadpool_limits(1):
             for rival in learners.rivals():
                 x, table = learners.inputs(rival), engine.Table(rival.table)
-                mine, peer, holds = [], [], True
+                mine, peer, holds, count = [], [], True, heap.Count()
                 if rival.peer:
                     holds = gate(f"query {rival.name}", {"difference": learners.error(rival, x)}, rival.tolerance)
                     self.all_hold &= holds
@@ -363,7 +364,7 @@ class Bench:
                 ours = Samples(np.concatenate(mine))
                 self.figures.add("query", rival.name, ours, theirs, holds, None)
                 self.facts(f"query.{rival.name}", table_bytes(rival.table), rival.operations, ours)
-        print(NO_ALLOCATION)
+                self.allocations(f"query.{rival.name}", count.calls, len(ours.us))
 
     def facts(self, name: str, size: int, operations: int, ours: Samples, read: int | None = None) -> None:
         """Bytes, multiply-adds of a query; how much of our time it takes to read as many bytes as it does (default: all)."""
@@ -376,6 +377,15 @@ class Bench:
         self.figures.rows.append(
             {"id": f"bench.{name}.of_bandwidth", "value": limit / ours.median, "unit": "1", "n": len(ours.us), "gate": True}
         )
+
+    def allocations(self, name: str, calls: float | None, n: int) -> None:
+        """The gate of no allocation: calls of the allocators in n timed queries, None if nobody counted."""
+        holds = calls == 0
+        self.all_hold &= holds
+        seen = "not counted" if calls is None else f"{calls:g}"
+        print(f"    allocations in {n} queries: {seen}, {'holds' if holds else 'FAILS'}")
+        if calls is not None:
+            self.figures.rows.append({"id": f"bench.{name}.allocations", "value": calls, "unit": "1", "n": n, "gate": holds})
 
     def trains(self) -> None:
         """Tensor trains beside PyTorch and teneva, networks beside PyTorch."""
@@ -405,13 +415,14 @@ class Bench:
             holds = gate(f"train d={case.d} n={case.n} r={case.r}", {"log probability": sides.error()}, case.tolerance)
             self.all_hold &= holds
             for count in counts:
+                allocated = heap.Count()
                 us = {name: Samples(values) for name, values in sides.times_us(count, min(self.rounds, 3)).items()}
                 for name, key in (("pytorch", "sample"), ("tuned", "sample_tuned"), ("teneva", "sample_teneva")):
                     if name in us:
                         self.figures.add("tt", f"{key}.{case.name(count)}", us["ours"], us[name], holds, None)
                 work = (sides.ours.bytes, case.operations(count), us["ours"], case.bytes_read(count))
                 self.facts(f"tt.sample.{case.name(count)}", *work)
-        print(NO_ALLOCATION)
+                self.allocations(f"tt.sample.{case.name(count)}", allocated.calls, len(us["ours"].us))
 
     def networks(self, worker) -> None:
         """Ensembles and mixture density networks."""
@@ -428,13 +439,14 @@ class Bench:
             ours, queries = engine.Table(table), x[: learners.QUERIES]
             holds = gate(f"query {name}", trains.error(network, ours, worker, x.min(0), x.max(0)), trains.TOLERANCE)
             self.all_hold &= holds
-            mine, peer = [], []
+            mine, peer, count = [], [], heap.Count()
             for _ in range(self.rounds):
                 mine.append(ours.time_us(queries, trains.answers(network)))
                 peer.append(worker.ask("predict_one_by_one", x=queries)["us"])
             samples = Samples(np.concatenate(mine))
             self.figures.add("query", name, samples, Samples(np.concatenate(peer)), holds, None)
             self.facts(f"query.{name}", table_bytes(table), trains.operations(network), samples)
+            self.allocations(f"query.{name}", count.calls, len(samples.us))
 
     def crosses(self) -> None:
         """Cross approximation of table 7.1's density; the gate: samples of our train succeed as often as teneva's."""
@@ -458,8 +470,10 @@ class Bench:
         row = {"id": "bench.tt.cross_success", "value": success["ours"], "unit": "1", "n": trains.TESTS, "gate": holds}
         self.figures.rows.append({**row, "peer": success["teneva"]})
 
-    def gemm(self) -> None:
-        """The limit of arithmetic: the best rate of a matrix product, under our flags and under the machine's own."""
+    def prepare(self) -> None:
+        """The peers; and the limit of arithmetic: the best rate of a matrix product, under our flags and the machine's own."""
+        build_peers(self.peers)
+        export_models(self.inputs)
         mine, peer = alternate(1, [self.ours, "gemm", 50], [self.peers / "pinocchio_bench", "-", "gemm", 50])
         rate = {
             side: max(2 * int(name.removeprefix("gemm")) ** 3 / s.us.min() * 1e-3 for name, s in samples.items())
@@ -480,9 +494,11 @@ def main() -> int:
     parser.add_argument("-n", type=int, default=300, help="samples per round of the smallest problem (default: 300)")
     parser.add_argument("--only", nargs="+", choices=parts, metavar="PART", help=f"of {', '.join(parts)}")
     args = parser.parse_args()
+    heap.restart_counting(args.build.resolve() / "bench" / "libcount_heap.so")
     bench = Bench(args.build.resolve(), args.rounds, args.n)
-    bench.gemm()
     only = args.only or parts
+    if {*PROBLEMS, *ROBOTS} & set(only):
+        bench.prepare()
     for name in (name for name in PROBLEMS if name in only):
         bench.problem(name)
     for robot in (robot for robot in ROBOTS if robot in only):

@@ -2,13 +2,13 @@
 #include "codegen/binding/arrays.h"
 #include "codegen/binding/engine_problems.h"
 #include "codegen/binding/held_table.h"
+#include "codegen/binding/thread_clock.h"
 #include "controller/memory/step_memory.h"
 #include "tables/talos_step/task.h"
 
 #include <nanobind/stl/optional.h>
 
 #include <algorithm>
-#include <ctime>
 #include <memory>
 #include <optional>
 
@@ -65,11 +65,7 @@ class StepMemory {
   Out query_us(const In<2>& feet, const In<1>& goal, int foot, const In<1>& x0, int n) {
     const StepTask task = task_of(feet, goal, foot, {}, {});
     NewArray us({std::size_t(n)});
-    for (int i = 0; i < n; ++i) {
-      const double start = thread_us();
-      ask(task, 0, x0);
-      us.data()[i] = thread_us() - start;
-    }
+    for (int i = 0; i < n; ++i) us.data()[i] = timed_us([&] { ask(task, 0, x0); });
     return us.release();
   }
 
@@ -83,12 +79,6 @@ class StepMemory {
     result["xs"] = xs.release();
     result["us"] = us.release();
     return result;
-  }
-
-  static double thread_us() {
-    timespec t;
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
-    return 1e6 * double(t.tv_sec) + 1e-3 * double(t.tv_nsec);
   }
 
   static StepTask task_of(const In<2>& feet, const In<1>& goal, int foot, const std::optional<In<1>>& previous,

@@ -8,7 +8,10 @@
 #include "controller/tab/tab_mlp.h"
 #include "controller/tab/tab_sdf.h"
 
+#include <nanobind/stl/optional.h>
+
 #include <functional>
+#include <optional>
 
 namespace engram::binding {
 namespace {
@@ -31,6 +34,16 @@ NewArray read_us(std::size_t bytes, std::size_t n) {
     us.data()[sample] = (thread_us() - start) / kRepeat;
   }
   return us;
+}
+
+// Calls of the allocators within timed queries so far; none if nobody counts. With `planted`, after one `new` and `delete` more.
+std::optional<long long> allocations(bool planted) {
+  if (!engram_count_heap) return {};
+  if (planted) timed_us([] {
+    int* volatile number = new int(1);
+    delete number;
+  });
+  return engram_count_heap(false);
 }
 
 class Table {
@@ -91,9 +104,8 @@ class Table {
     std::vector<int32_t> index(count);
     Floats weight(count), y(count * pad_);
     for (std::size_t row = 0; row < n; ++row) {
-      const double start = thread_us();
-      tab_answers(head, X.data() + row * head->nin, count, index.data(), weight.data(), y.data(), nullptr);
-      us.data()[row] = thread_us() - start;
+      us.data()[row] = timed_us(
+          [&] { tab_answers(head, X.data() + row * head->nin, count, index.data(), weight.data(), y.data(), nullptr); });
     }
     return us;
   }
@@ -137,6 +149,8 @@ void bind_tables(nb::module_& engine) {
            "Processor time of each query [us].");
   engine.def("read_us", [](std::size_t bytes, std::size_t n) { return read_us(bytes, n).release(); }, "bytes"_a, "n"_a,
              "Processor time [us] of reading that many bytes, n samples over the same memory.");
+  engine.def("allocations", &allocations, "planted"_a = false,
+             "Calls of the allocators within timed queries so far, None if bench/count_heap.cc is not loaded; planted: after a new and a delete.");
 }
 
 }  // namespace engram::binding

@@ -65,11 +65,8 @@ class TensorTrain {
     if (count < 1 || count > sampler_.capacity) throw nb::value_error("count: 1 .. capacity");
     std::vector<double> x(std::size_t(count) * tab_->d);
     NewArray us({repeats});
-    for (std::size_t i = 0; i < repeats; ++i) {
-      const double start = thread_us();
-      (void)tab_tt_sample(&sampler_, alpha, count, i, x.data(), nullptr);
-      us.data()[i] = thread_us() - start;
-    }
+    for (std::size_t i = 0; i < repeats; ++i)
+      us.data()[i] = timed_us([&] { (void)tab_tt_sample(&sampler_, alpha, count, i, x.data(), nullptr); });
     return us;
   }
 
