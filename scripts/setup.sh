@@ -108,7 +108,7 @@ setup_python() {
 }
 
 pip_install() {
-  .venv/bin/python -m pip install --no-input --disable-pip-version-check --no-deps "$@" >> build/logs/pip.log 2>&1 < /dev/null ||
+  .venv/bin/python -m pip install --no-input --disable-pip-version-check --no-compile --no-deps "$@" >> build/logs/pip.log 2>&1 < /dev/null ||
     fail "pip install failed, see build/logs/pip.log" "check the network, then run again"
 }
 

@@ -1,7 +1,7 @@
 """Builds and runs every test, rung by rung, and closes with one line: `N passed, N failed`.
 
-The ladder: unit, reference, golden, closed_loop, hil, fuzz (C++ by ctest, Python by pytest), then `sanitize`: the C++ unit and
-fuzz tests once more under AddressSanitizer and UndefinedBehaviorSanitizer, which compile while the other rungs run. A rung
+The ladder: reference, golden, closed_loop, hil, unit, fuzz (C++ by ctest, Python by pytest). The C++ tests of unit and fuzz
+run under AddressSanitizer and UndefinedBehaviorSanitizer; they come last since they compile while the other rungs run. A rung
 with fewer tests than tests/floor.txt says fails: tests must not vanish.
 
     scripts/test.py                    everything
@@ -26,7 +26,8 @@ ROOT = Path(__file__).resolve().parent.parent
 BUILD = ROOT / "build"
 REPORTS = BUILD / "reports"
 FLOOR = ROOT / "tests" / "floor.txt"
-RUNGS = ("unit", "reference", "golden", "closed_loop", "hil", "fuzz", "sanitize")
+RUNGS = ("reference", "golden", "closed_loop", "hil", "unit", "fuzz")
+SANITIZED = ("unit", "fuzz")  # their programs are in build/asan/
 ALONE = ("closed_loop", "hil")  # these run two processes each that wait for one another: one test at a time
 TIMEOUT_S = 300  # of one test program: a hang fails, the ladder goes on
 
@@ -56,16 +57,15 @@ class Count:
                 self.passed += 1
 
 
-def run_ctest(build: Path, rung: str, label: str, count: Count) -> None:
-    """Runs the GoogleTest programs with the label `label`; a program that dies without a report is one failure."""
+def run_ctest(rung: str, count: Count) -> None:
+    """Runs the GoogleTest programs of tests/<rung>/; a program that dies without a report is one failure."""
     reports = REPORTS / rung
-    shutil.rmtree(reports, ignore_errors=True)
-    reports.mkdir(parents=True)
+    build = BUILD / "asan" if rung in SANITIZED else BUILD
     summary = reports / "ctest.xml"
     jobs = 1 if rung in ALONE else os.cpu_count() or 1
     env = os.environ | {"GTEST_OUTPUT": f"xml:{reports}/gtest/", "UBSAN_OPTIONS": "print_stacktrace=1"}
     subprocess.run(
-        ["ctest", "--test-dir", build, "-L", f"^({label})$", "-j", str(jobs), "--timeout", str(TIMEOUT_S), "--output-on-failure",
+        ["ctest", "--test-dir", build, "-L", f"^{rung}$", "-j", str(jobs), "--timeout", str(TIMEOUT_S), "--output-on-failure",
          "--no-tests=ignore", "--quiet", "--output-junit", summary],
         env=env, check=False, stdin=subprocess.DEVNULL)  # fmt: skip
     for file in sorted((reports / "gtest").glob("*.xml")):
@@ -83,22 +83,40 @@ def run_ctest(build: Path, rung: str, label: str, count: Count) -> None:
             count.passed += 1
 
 
-def run_pytest(rung: str, count: Count) -> None:
-    """Runs tests/<rung>/test_*.py."""
+def start_pytest(rung: str) -> subprocess.Popen | None:
+    """Starts tests/<rung>/test_*.py, if there are any."""
     folder = ROOT / "tests" / rung
     if not any(folder.glob("**/test_*.py")):
-        return
+        return None
     report = REPORTS / rung / "pytest.xml"
-    status = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "--tb=short", "--no-header", f"--junitxml={report}", folder],
-        cwd=ROOT, check=False, stdin=subprocess.DEVNULL).returncode  # fmt: skip
+    command = [sys.executable, "-m", "pytest", "-q", "--tb=short", "--no-header", f"--junitxml={report}", folder]
+    return subprocess.Popen(command, cwd=ROOT, stdin=subprocess.DEVNULL)
+
+
+def await_pytest(rung: str, run: subprocess.Popen, count: Count) -> None:
+    """Waits for the Python tests; a run that ends without a report is one failure."""
+    status = run.wait()
+    report = REPORTS / rung / "pytest.xml"
+    failed_before = count.failed
     if report.exists():
-        failed_before = count.failed
         count.add_junit(report)
-        if status not in (0, 5) and count.failed == failed_before:
-            count.failed += 1
-    else:
+    if status not in (0, 5) and count.failed == failed_before:
         count.failed += 1
+
+
+def run_rung(rung: str, count: Count, sanitized: subprocess.Popen | None) -> None:
+    """All tests of a rung, its Python tests beside its C++ tests."""
+    shutil.rmtree(REPORTS / rung, ignore_errors=True)
+    (REPORTS / rung).mkdir(parents=True)
+    if rung in ALONE:
+        run_ctest(rung, count)
+    python = start_pytest(rung)
+    if sanitized:
+        await_sanitized(sanitized, count)
+    if rung not in ALONE:
+        run_ctest(rung, count)
+    if python:
+        await_pytest(rung, python, count)
 
 
 def build_sanitized() -> subprocess.Popen:
@@ -109,6 +127,8 @@ def build_sanitized() -> subprocess.Popen:
 
 def await_sanitized(build: subprocess.Popen, count: Count) -> None:
     """Waits for the sanitized tests; a build that stops is one failure."""
+    if build.returncode is not None:
+        return  # an earlier rung has waited
     said, _ = build.communicate()
     if build.returncode:
         print(said, flush=True)
@@ -138,16 +158,11 @@ def main() -> int:
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; tests send it
     counts: dict[str, Count] = {}
-    sanitized = build_sanitized() if "sanitize" in rungs else None
+    sanitized = build_sanitized() if set(SANITIZED) & set(rungs) else None
     for rung in rungs:
         print(f"---- {rung} ----", flush=True)
         start, count = time.monotonic(), Count()
-        if sanitized and rung == "sanitize":
-            await_sanitized(sanitized, count)
-            run_ctest(BUILD / "asan", rung, "unit|fuzz", count)
-        else:
-            run_ctest(BUILD, rung, rung, count)
-            run_pytest(rung, count)
+        run_rung(rung, count, sanitized if rung in SANITIZED else None)
         count.seconds = time.monotonic() - start
         counts[rung] = count
 

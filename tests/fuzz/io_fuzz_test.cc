@@ -1,4 +1,5 @@
 // link: engram_io
+// options: -O1
 // Garbage at the door of the program: random bytes, broken messages, extreme numbers. Nothing crashes, every torque that leaves is
 // finite and within its limit. Run under ASan and UBSan.
 #include <gtest/gtest.h>

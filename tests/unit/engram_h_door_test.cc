@@ -1,4 +1,5 @@
 // link: engram_panda_reach
+// options: -O1
 // The door: sizes, placement, options, texts, several controllers in one program.
 #include <gtest/gtest.h>
 

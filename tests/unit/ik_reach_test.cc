@@ -1,4 +1,3 @@
-// link: engram_core
 // Inverse kinematics: reaches, keeps limits, prefers a posture without giving up the pose, leaves a free base alone, says when it fails.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 // link: engram_io
+// options: -O1
 // Lock step: every state is answered once, the same bytes in give the same bytes out, and trouble changes nothing.
 #include "controller/io/io_lockstep.h"
 

@@ -1,4 +1,5 @@
 // link: engram_panda_reach
+// options: -O1
 // The torque of the fast side: tau = u* - K (x (-) x*), its sign by finite differences, the clamp and the rate limit.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,5 @@
 // link: engram_panda_reach
+// options: -O1
 // Every rung of the fall-back ladder is reached by an injected fault, is reported, and is left again.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,4 @@
 // Steps from rest to rest: what each knot asks for.
-// options: -O1
 #include "controller/loop/loop_steps.h"
 
 #include <gtest/gtest.h>

@@ -1,4 +1,5 @@
 // link: engram_tab engram_tables_panda_reach
+// options: -O1
 // The query of the Panda's memory: what every guess must be, in and far outside of what the memory knows.
 #include "controller/memory/memory_query.h"
 

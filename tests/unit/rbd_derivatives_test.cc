@@ -1,4 +1,3 @@
-// link: engram_core
 // Analytic derivatives of inverse dynamics, forward dynamics and gravity against central differences.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,3 @@
-// link: engram_core
 // RNEA, CRBA, ABA and forward dynamics: by hand, against each other, and against the power balance.
 #include <gtest/gtest.h>
 

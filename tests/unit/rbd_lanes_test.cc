@@ -1,4 +1,3 @@
-// link: engram_core
 // A lane of Pack computes, bit for bit, what the scalar computes (but for the sign of a zero).
 #include <gtest/gtest.h>
 

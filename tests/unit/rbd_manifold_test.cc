@@ -1,4 +1,3 @@
-// link: engram_core
 // exp and log of SO(3) and SE(3), their Jacobians, and the configuration manifold.
 #include <gtest/gtest.h>
 

@@ -1,4 +1,3 @@
-// link: engram_core
 // Branch-free elementary functions against libm in long double.
 #include <gtest/gtest.h>
 

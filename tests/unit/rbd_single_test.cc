@@ -1,5 +1,5 @@
 // link: engram_core
-// options: -DENGRAM_SINGLE
+// options: -Og -DENGRAM_SINGLE
 // The room in single precision: elementary functions in units of the last place, dynamics against its own inverses.
 #include <gtest/gtest.h>
 

@@ -1,6 +1,5 @@
 // The memory of steps on the tables of the tree: frames do not matter, the right foot is the left one mirrored, bad input.
 // link: engram_tab engram_tables_talos_step
-// options: -O1
 #include "controller/memory/step_memory.h"
 
 #include "tables/talos_step/tables.h"

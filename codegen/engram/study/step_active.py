@@ -16,7 +16,7 @@ from engram.data.step_set import StepData
 from engram.data.steps import WALKS
 from engram.engine import engine
 from engram.learn.gpr import kernel_matrix
-from engram.learn.steps import FROM_WALK, INTO_WALK, StepTables, fit_regression, length_scales
+from engram.learn.steps import FROM_WALK, INTO_WALK, StepTables, fit_regression
 from engram.study.report import Report
 from engram.study.steps import SETTINGS, TESTED, Tested, draw_tested, learnt_from, load_sets
 
@@ -56,7 +56,7 @@ class Grower:
         self.tables, self.problem, self.pool = tables, engine.TalosSteps(), pool
         coded = tables.coded
         single = ~coded.x[:, [FROM_WALK, INTO_WALK]].any(axis=1)
-        self.x, self.z, self.length = coded.x[single], coded.z[single], length_scales(coded, SETTINGS)
+        self.x, self.z, self.length = coded.x[single], coded.z[single], tables.regression.length
         held = np.arange(max(map(len, sets[:WALKS]))) % 20 == 19  # as the split of the fit
         self.tasks = [(x[:6].reshape(2, 3), x[6:], foot) for foot in (0, 1)
                       for x, out in zip(sets[foot].X, held, strict=False) if not out]  # fmt: skip

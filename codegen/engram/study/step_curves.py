@@ -15,7 +15,7 @@ from engram.engine import engine
 from engram.learn.contenders import network_table
 from engram.learn.network import fit_ensemble
 from engram.learn.step_fit import nbytes
-from engram.learn.steps import StepTables, fit_regression, length_scales
+from engram.learn.steps import StepTables, fit_regression
 from engram.study.report import Report
 from engram.study.step_train import StepTrain
 from engram.study.steps import (
@@ -144,7 +144,7 @@ def against_samples(sets: list, tested: list[Tested], samples: tuple[int, ...]) 
 
 def against_bytes(tables: StepTables, tested: list[Tested], inducing: tuple[int, ...]) -> list[tuple[int, int, Count]]:
     """What more bytes buy: the regression on fewer samples, with all data in their weights."""
-    length, found = length_scales(tables.coded, SETTINGS), []
+    length, found = tables.regression.length, []
     for n in inducing:
         fitted = fit_regression(tables.coded.x, tables.coded.z, length, replace(SETTINGS, samples=n))
         smaller = replace(tables, regression=replace(tables.regression, x=fitted.x, alpha=fitted.alpha, length=length))

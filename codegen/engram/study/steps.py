@@ -7,7 +7,7 @@ iteration that finds the rule fulfilled counts, so that two are the least from a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -222,7 +222,7 @@ def load_sets(quick: bool) -> list[StepData]:
 @cache
 def learnt_from(quick: bool, raw: bool = False) -> Learners:
     """The learners on all data; fitted once, however many rows are asked for."""
-    return Learners(load_sets(quick), raw)
+    return Learners(load_sets(quick), raw, replace(SETTINGS, hyperparameter_samples=200) if quick else SETTINGS)
 
 
 def accuracy(report: Report, quick: bool, tested: list[Tested]) -> None:
