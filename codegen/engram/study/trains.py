@@ -16,7 +16,6 @@ SOLVED = 0.25  # cost at or below which a task counts as solved (thesis, caption
 WORKERS = 2  # seeds that are built side by side
 OUTERMOST = 0.01  # share of the starting points, at either end, that a fitted grid leaves out
 MARGIN = 0.02  # what it adds, of the others' range
-JUDGED = (1, 10, 100)  # numbers of samples that a seed is judged by
 
 
 @dataclass(frozen=True)
@@ -41,6 +40,7 @@ class Recipe:
     evaluations: int = 200  # of cost and gradient in one refinement
     spread: bool = False  # starting points lie apart in the task, the same ones in all blocks of a sweep
     start_evaluations: int = 0  # of cost and gradient on the way to a starting point; 0: as in a refinement
+    judged: tuple[int, ...] = (1, 10, 100)  # numbers of samples that a seed is judged by
 
 
 @dataclass
@@ -137,7 +137,7 @@ def build(
     draw: Callable[[np.random.Generator, int], np.ndarray],
     validation: np.ndarray,
 ) -> Built:
-    """The train of the seed from whose samples most validation tasks are solved, on average over `JUDGED`."""
+    """The train of the seed from whose samples most validation tasks are solved, on average over `judged`."""
     cost.scale, cost.power = recipe.scale, recipe.power
     cpu, wall = time.process_time(), time.perf_counter()
     weights, coarser = recipe.weights
@@ -157,8 +157,8 @@ def build(
 
     def judged(table: Tt) -> tuple[float, engine.TensorTrain]:
         train = engine.TensorTrain(table, 1000)
-        drawn = samples(train, cost, validation, recipe.alpha, max(JUDGED))
-        c = np.array([cost.refine(lowest(cost, drawn[:, :n])[0], recipe.evaluations)[1] for n in JUDGED])
+        drawn = samples(train, cost, validation, recipe.alpha, max(recipe.judged))
+        c = np.array([cost.refine(lowest(cost, drawn[:, :n])[0], recipe.evaluations)[1] for n in recipe.judged])
         # among equals, the lower cost
         return float(np.mean(c <= SOLVED)) - 1e-3 * float(np.mean(np.minimum(c, 1))), train
 
