@@ -2,8 +2,9 @@
 //
 //   engram-pole motions=20 seed=1 memory=memory|shift|cold [first=N] [cycles=FILE] [guide=1] [record=FILE]
 //
-// A motion: the hand is brought to a random point on one side of the pole by a guide that knows the way round (`Guide`), then the target goes
-// to a random point on the other side, at once or along a straight line at up to kSpeed, and the controller is on its own for kAlone seconds.
+// A motion: the hand is brought to a random point on one side of the pole by a guide that plans the way (`PoleGuide`; led 0: it found none),
+// then the target goes to a random point on the other side, at once or along a straight line at up to kSpeed, and the controller is on its
+// own for kAlone seconds.
 // Success: the robot stands, the arm never touched the pole, and the hand is within the task's success_position over the last kRest seconds.
 // With `guide=1` the guide leads in both parts, after up to kStray seconds in which the hand may get stuck: the runs from which the memory
 // learns. record=FILE: one row of doubles per control period of the second part of a motion that succeeds (native byte order): motion,
@@ -15,6 +16,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <memory>
 #include <random>
 #include <string>
 #include <vector>
@@ -27,6 +29,8 @@
 namespace {
 
 using engram::PoleGuide;
+using engram::RrtResult;
+using engram::uniform;
 using engram::test::LeggedController;
 using engram::test::LeggedPlant;
 using Task = engram::tasks::TalosPole;
@@ -40,9 +44,6 @@ struct Motion {
   double speed;           // m/s; 0: the target jumps
   int64_t stray;          // us, of a guided run: so long the hand goes on its own first, and may get stuck
 };
-
-// uniform in [lo, hi], the same numbers on every machine
-double uniform(std::mt19937_64& rng, double lo, double hi) { return lo + (hi - lo) * static_cast<double>(rng() >> 11) * 0x1p-53; }
 
 // A point on one side of the pole: left 1, right -1. Out of the pole's way and within reach.
 void draw(std::mt19937_64& rng, int side, double (&p)[3]) {
@@ -115,6 +116,7 @@ int main(int argc, char** argv) {
 
   std::mt19937_64 rng(seed), astray(~seed);
   std::vector<double> cycles, queries;
+  const auto guide = std::make_unique<PoleGuide>();
   int successes = 0, done = 0;
   for (int n = 0; n < first + motions; ++n) {
     const Motion m = draw(rng, astray);
@@ -136,16 +138,16 @@ int main(int argc, char** argv) {
       fallen = fallen || !(plant.base_up() > 0.8);
     };
     // to the first point
-    PoleGuide guide;
-    const auto lead = [&](const double (&to)[3]) {
+    const auto lead = [&](bool fresh) {
       double p[3];
-      if (guide.lead(hand, to, p)) ask(p, true);
+      guide->lead(hand, p);
+      ask(p, fresh);
     };
-    guide.begin();
+    bool led = guide->begin(plant.q.data(), m.from, seed + static_cast<uint64_t>(n)) == RrtResult::kFound;
     int still = 0;
     const auto settled = [&] { return still >= 300 && plant.utime % 10000 == 0; };  // the second part begins at a tick
     while (plant.utime < static_cast<int64_t>(1e6 * kSettle) && !settled() && !fallen) {
-      if (plant.utime % 10000 == 0) lead(m.from);
+      if (plant.utime % 10000 == 0) lead(plant.utime == 0);
       step();
       still = distance(hand, m.from) < Task::success_position ? still + 1 : 0;
     }
@@ -161,7 +163,7 @@ int main(int argc, char** argv) {
       target(1e-6 * static_cast<double>(plant.utime - begin), p);
       if (plant.utime % 10000 == 0) ask(p, plant.utime == begin);
     }
-    guide.begin();
+    if (guided && ready && !fallen) led = guide->begin(plant.q.data(), m.to, seed + static_cast<uint64_t>(n)) == RrtResult::kFound && led;
     const int64_t start = plant.utime;
     std::vector<double> rows;
     double worst = 0.0, over = 0.0;
@@ -170,7 +172,7 @@ int main(int argc, char** argv) {
       const double t = 1e-6 * static_cast<double>(plant.utime - start);
       if (plant.utime % 10000 == 0) {
         if (guided) {
-          lead(m.to);
+          lead(t == 0.0);
         } else {
           target(t, p);
           if (t == 0.0 || m.speed > 0.0) ask(p, t == 0.0);  // those within the pole are refused: the last one stays
@@ -200,8 +202,8 @@ int main(int argc, char** argv) {
     if (success && log != nullptr) std::fwrite(rows.data(), sizeof(double), rows.size(), log);
     successes += success ? 1 : 0;
     ++done;
-    std::printf("motion %d side %d speed %.2f ready %d success %d error_m %.4f touched %d over_mrad %.2f fallen %d refused %d remembered %d asked %d worse %d hand %.3f %.3f %.3f\n", n,
-                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, worst, touched, 1e3 * over, fallen, refused, remembered, asked, worse, hand[0], hand[1], hand[2]);
+    std::printf("motion %d side %d speed %.2f ready %d success %d led %d error_m %.4f touched %d over_mrad %.2f fallen %d refused %d remembered %d asked %d worse %d hand %.3f %.3f %.3f\n", n,
+                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, led, worst, touched, 1e3 * over, fallen, refused, remembered, asked, worse, hand[0], hand[1], hand[2]);
     std::fflush(stdout);
   }
   if (log != nullptr) std::fclose(log);

@@ -1,44 +1,54 @@
-// A guide around the pole: intermediate targets for the hand, from a view wider than the controller's horizon.
-//
-// The arm cannot pass the pole on its far side, since the forearm would lie across it. Seen from above, whoever changes sides therefore
-// passes between the shoulder and the pole: in two legs, over a way point there. Each leg is a problem that the controller's own
-// solver finds its way in without help.
+// A guide around the pole: targets for the hand along a way that a planner with a view of the whole task has found.
 #ifndef CODEGEN_OFFLINE_POLE_GUIDE_H_
 #define CODEGEN_OFFLINE_POLE_GUIDE_H_
 
-#include <cmath>
-#include <cstring>
-
-#include "tables/talos_pole/task.h"
+#include "codegen/offline/pole_space.h"
+#include "codegen/offline/rrt_connect.h"
+#include "controller/loop/loop_talos_pole.h"
 
 namespace engram {
 
 class PoleGuide {
  public:
-  void begin() { leg_ = -1; }
+  using Space = PoleSpace<TalosPole>;
+  static constexpr int kPool = 3000;
 
-  // hand: where it is [m], to: where it shall go. True if the target p is a new one.
-  bool lead(const double* hand, const double (&to)[3], double (&p)[3]) {
-    const double* const pole = tasks::TalosPole::p_WO[0];
-    const double via[3] = {pole[0] - kBefore, pole[1], std::fmax(0.5 * (hand[2] + to[2]) - kLower, tasks::TalosPole::task_lo[2])};
-    const int before = leg_;
-    if (leg_ < 0) {
-      leg_ = (hand[1] - pole[1]) * (to[1] - pole[1]) < 0.0 ? 0 : 1;
-      std::memcpy(via_, via, sizeof via);
-    }
-    if (leg_ == 0) {
-      const double there = std::sqrt((hand[0] - via_[0]) * (hand[0] - via_[0]) + (hand[1] - via_[1]) * (hand[1] - via_[1]));
-      if (there < kNear) leg_ = 1;
-    }
-    std::memcpy(p, leg_ == 0 ? via_ : to, sizeof p);
-    return leg_ != before;
+  // Plans from the posture q (nq) for the hand to go to `to` [m, world].
+  RrtResult begin(const double* q, const double (&to)[3], uint64_t seed) {
+    at_ = size_ = 0;
+    std::memcpy(to_, to, sizeof to_);
+    if (!allowed(to)) return RrtResult::kNoGoal;
+    const Space space(q);
+    if (!(space.margin() > 0.0)) return RrtResult::kNoStart;
+    Space::Node goals[kGoals];
+    const RrtResult result = rrt_.plan(space, space.start(), goals, space.reach(to, seed, goals, kGoals), seed);
+    if (result != RrtResult::kFound) return result;
+    rrt_.shorten(space, kCuts);
+    for (size_ = 0; size_ < rrt_.size(); ++size_) space.hand(rrt_.path()[size_], way_[size_]);
+    return result;
+  }
+
+  // hand: where it is [m]. p: where it shall go now, a little ahead on the way; without a way, the end.
+  void lead(const double* hand, double (&p)[3]) {
+    while (at_ < size_ && (distance(hand, way_[at_]) < kAhead || !allowed(way_[at_]))) ++at_;
+    std::memcpy(p, at_ < size_ ? way_[at_] : to_, sizeof p);
   }
 
  private:
-  static constexpr double kBefore = 0.22, kLower = 0.05;  // m, of the way point before the pole and below the way
-  static constexpr double kNear = 0.07;                   // m, of the way point in the plane: the next leg begins
-  int leg_ = -1;
-  double via_[3] = {};
+  static constexpr int kGoals = 3, kCuts = 200;
+  static constexpr double kAhead = 0.12;  // m
+
+  static bool allowed(const double* p) {
+    LeggedCommand command;
+    TalosPole::command(p, command);
+    return TalosPole::reachable(command) && LeggedModel<TalosPole>::known(p);
+  }
+  static double distance(const double* a, const double* b) { return std::hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]); }
+
+  RrtConnect<Space, kPool> rrt_;
+  double way_[kPool][3];
+  double to_[3];
+  int at_ = 0, size_ = 0;
 };
 
 }  // namespace engram

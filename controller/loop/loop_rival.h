@@ -7,6 +7,7 @@
 // A memory has
 //
 //   static constexpr bool kRemembers;  static constexpr int kIterations, kPatience;
+//   static bool needless(target, x0)   true where the shifted plan alone finds its way: nothing is asked or iterated
 //   bool guess(target, seq, const Plan& shifted, Seed&)   a trajectory on the shifted plan's knot times and from its state; false: none.
 //                                                         seq counts ticks: those who know several ways offer them in turn
 #ifndef CONTROLLER_LOOP_LOOP_RIVAL_H_
@@ -29,8 +30,9 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
 
   explicit Rival(const engram_options& options) : solve_(options) {}
 
-  // False if there is none. extend(k, x, u, x_next): how a trajectory goes on beyond its end.
+  // False if there is none, or if none is needed. extend(k, x, u, x_next): how a trajectory goes on beyond its end.
   template <class Extend> bool ask(const typename M::Target& target, int64_t seq, const Solve<M>& shifted, Extend extend) {
+    if (M::Memory::needless(target, shifted.horizon.x0)) return age_ = 0, false;
     if (age_ >= M::Memory::kPatience) age_ = 0;
     reg_ = age_ > 0 ? solve_.reg() : 0.0;
     if (age_ > 0) resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, seed_, extend);

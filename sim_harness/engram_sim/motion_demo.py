@@ -30,12 +30,13 @@ def demo(args: argparse.Namespace, folder: Path) -> int:
     if args.jumps is not None and args.jumps < 1:
         raise InputError("--jumps: at least one way point or episode")
     spec = load_motion(args.robot, args.task)
-    script = scenarios.script(spec, args.seed, args.jumps)
+    script = scenarios.script(spec, args.seed, args.jumps, args.seconds)
     path = folder / f"{script.kind}.txt"
     script.write(path)
     print(f"{script.kind:<8}{script.parts} parts, seed {args.seed}: {relative(path)}")
 
-    for mode in (MODE, *BESIDE.get(f"{args.robot}_{args.task}", ())):
+    beside = BESIDE.get(f"{args.robot}_{args.task}", ()) if args.seconds is None else ()
+    for mode in (MODE, *beside):
         if not run_mode(args, folder, mode, script, path):
             return 1
     header = {"robot": args.robot, "task": args.task, "seed": args.seed, "clock": args.clock, "site": script.site}

@@ -15,6 +15,7 @@ from engram_sim.series import HELD_OUT, numbers
 
 YAWS = (0.0, 90.0, 180.0, 270.0)  # deg
 PUSH_TIME = 0.1  # s, a push lasts
+STAY = 4.0  # s, a target beside the pole stays
 
 
 @dataclass
@@ -86,19 +87,34 @@ def talos_walk(spec: MotionSpec, seed: int, parts: int | None) -> Script:
 def talos_pole(spec: MotionSpec, seed: int, parts: int | None) -> Script:
     """The right hand goes to points beside the pole: to one, and then to another on the other side."""
     rng = np.random.default_rng([HELD_OUT, seed])
-    pole = spec.boxes.p_WO[0]
     radius, episodes = float(spec.constants["success_position"]), []
     for n in range(parts or 8):
-        points = [
-            [rng.uniform(0.32, 0.45), pole[1] + side * rng.uniform(0.16, 0.3), rng.uniform(0.95, 1.2)]
-            for side in ((-1.0, 1.0), (-1.0, 1.0, -1.0))[n % 2]
-        ]
+        points = [beside_pole(spec, rng, side) for side in ((-1.0, 1.0), (-1.0, 1.0, -1.0))[n % 2]]
         times = [0.0, 3.0, 7.0][: len(points)]
         tasks = [f"task {t} {numbers(np.array(p))}" for t, p in zip(times, points)]
         end = times[-1] + 4.0
         asked = [f"reach {end - 0.3} {radius} right_gripper {numbers(np.array(points[-1]))}", "clear pole", "upright 0.6 0.7"]
         episodes.append([f"episode around_{n + 1} {end}", home(spec, 0.0), *tasks, *asked])
     return scenario(spec, seed, episodes, "right_gripper")
+
+
+def talos_pole_whole(spec: MotionSpec, seed: int, seconds: float) -> Script:
+    """The same in one episode of `seconds`: every few seconds a new point, mostly on the other side."""
+    rng = np.random.default_rng([HELD_OUT, seed])
+    radius, side = float(spec.constants["success_position"]), -1.0
+    times, points = [0.0], [beside_pole(spec, rng, side)]
+    while times[-1] + 2.0 * STAY <= seconds:
+        side = -side if rng.uniform() < 0.8 else side
+        times.append(times[-1] + STAY)
+        points.append(beside_pole(spec, rng, side))
+    tasks = [f"task {t} {numbers(np.array(p))}" for t, p in zip(times, points)]
+    asked = [f"reach {seconds - 0.3} {radius} right_gripper {numbers(np.array(points[-1]))}", "clear pole", "upright 0.6 0.7"]
+    return scenario(spec, seed, [[f"episode whole {seconds}", home(spec, 0.0), *tasks, *asked]], "right_gripper")
+
+
+def beside_pole(spec: MotionSpec, rng: np.random.Generator, side: float) -> list[float]:
+    """A random point (m, world) left (side 1) or right (-1) of the pole."""
+    return [rng.uniform(0.32, 0.45), spec.boxes.p_WO[0][1] + side * rng.uniform(0.16, 0.3), rng.uniform(0.95, 1.2)]
 
 
 def anymal_trot(spec: MotionSpec, seed: int, parts: int | None) -> Script:
@@ -207,9 +223,16 @@ MOTIONS: dict[str, Callable[[MotionSpec, int, int | None], Script]] = {
 }
 
 
-def script(spec: MotionSpec, seed: int, parts: int | None) -> Script:
-    """The script of a motion; its first `parts` parts, or all. Raises InputError."""
+WHOLE: dict[str, Callable[[MotionSpec, int, float], Script]] = {"talos_pole": talos_pole_whole}  # in one episode of any length
+
+
+def script(spec: MotionSpec, seed: int, parts: int | None, seconds: float | None = None) -> Script:
+    """The script of a motion: its first `parts` parts, or all; or one episode of `seconds`. Raises InputError."""
     name = f"{spec.robot.name}_{spec.name}"
+    if seconds is not None:
+        if name not in WHOLE or not seconds >= 2.0 * STAY:
+            raise InputError(f"--seconds: at least {2.0 * STAY:.0f}, of {', '.join(WHOLE)}; leave it out for all others")
+        return WHOLE[name](spec, seed, seconds)
     if name not in MOTIONS:
         raise InputError(f"no demo is written for '{name}'; {closest(name, list(MOTIONS))}; write one in {Path(__file__).name}")
     return MOTIONS[name](spec, seed, parts)

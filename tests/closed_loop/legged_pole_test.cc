@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <memory>
 
+#include "codegen/offline/pole_guide.h"
 #include "tests/support/legged_plant.h"
 
 namespace engram::test {
@@ -74,6 +76,66 @@ TEST_F(PoleTest, TargetsInThePoleAndOutOfReachAreRefused) {
   EXPECT_EQ(engram_set_task(c.handle, 0, 1, odd, 3), ENGRAM_BAD_TASK);
   EXPECT_EQ(engram_set_task(c.handle, 0, 1, kRight, 2), ENGRAM_BAD_TASK);
   EXPECT_EQ(engram_set_task(c.handle, 0, 1, kRight, 3), ENGRAM_CONVERGED);
+}
+
+// The planner that guides the runs from which the memory learns.
+struct PoleRrt : testing::Test {
+  using Space = PoleGuide::Space;
+  static constexpr int kPool = 3000;
+  const double* const home = robots::Talos::q_home;
+  const Space space{home};
+
+  // From the hand at one point to the hand at another.
+  template <int pool> static RrtResult between(RrtConnect<Space, pool>& rrt, const Space& space, const double* a, const double* b, uint64_t seed) {
+    Space::Node start, goals[3];
+    EXPECT_EQ(space.reach(a, 1, &start, 1), 1);
+    return rrt.plan(space, start, goals, space.reach(b, 1, goals, 3), seed);
+  }
+};
+
+TEST_F(PoleRrt, FindsWaysAroundThePoleOnStandingFeet) {
+  const auto rrt = std::make_unique<RrtConnect<Space, kPool>>();
+  for (uint64_t seed = 1; seed <= 3; ++seed) {
+    for (const bool right : {true, false}) {
+      ASSERT_EQ(between(*rrt, space, right ? kRight : kLeft, right ? kLeft : kRight, seed), RrtResult::kFound) << "seed " << seed;
+      const int size = rrt->size();
+      rrt->shorten(space, 100);
+      EXPECT_LE(rrt->size(), size);
+      for (int i = 0; i < rrt->size(); ++i) {
+        double feet, pole;
+        space.measure(rrt->path()[i], feet, pole);
+        EXPECT_LT(feet, 1e-3);  // m
+        EXPECT_GT(pole, 0.03);  // m, of every sphere
+        EXPECT_LT(i == 0 ? 0.0 : space.distance(rrt->path()[i - 1], rrt->path()[i]), 0.16);  // rad, no jumps
+      }
+      double end[3];
+      space.hand(rrt->path()[rrt->size() - 1], end);
+      const double* const to = right ? kLeft : kRight;
+      EXPECT_LT(std::hypot(end[0] - to[0], end[1] - to[1], end[2] - to[2]), 0.005);
+    }
+  }
+}
+
+TEST_F(PoleRrt, TheSameSeedGivesTheSamePath) {
+  const auto one = std::make_unique<RrtConnect<Space, kPool>>(), other = std::make_unique<RrtConnect<Space, kPool>>();
+  ASSERT_EQ(between(*one, space, kRight, kLeft, 7), RrtResult::kFound);
+  ASSERT_EQ(between(*other, space, kRight, kLeft, 7), RrtResult::kFound);
+  ASSERT_EQ(one->size(), other->size());
+  EXPECT_EQ(std::memcmp(one->path(), other->path(), sizeof(Space::Node) * static_cast<size_t>(one->size())), 0);
+}
+
+TEST_F(PoleRrt, ASpentPoolIsReported) {
+  const auto rrt = std::make_unique<RrtConnect<Space, 12>>();
+  EXPECT_EQ(between(*rrt, space, kRight, kLeft, 1), RrtResult::kPoolSpent);
+  EXPECT_EQ(rrt->size(), 0);
+  EXPECT_LE(rrt->nodes(), 12);
+}
+
+TEST_F(PoleRrt, ATargetInThePoleOrOutOfReachIsRefused) {
+  const auto guide = std::make_unique<PoleGuide>();
+  EXPECT_EQ(guide->begin(home, {0.34, -0.27, 1.0}, 1), RrtResult::kNoGoal);
+  EXPECT_EQ(guide->begin(home, {1.5, 0.0, 1.0}, 1), RrtResult::kNoGoal);
+  EXPECT_EQ(guide->begin(home, {0.40, -0.53, 1.04}, 1), RrtResult::kFound);
 }
 
 }  // namespace

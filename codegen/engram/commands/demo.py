@@ -21,6 +21,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument("--task", help="task to run (default: stand, or the first by name)")
     parser.add_argument("--seed", type=int, default=1, help="of the task series; none repeats the training data (default: 1)")
     parser.add_argument("--jumps", type=int, help="jumps, way points or episodes (default: 300 jumps, or all)")
+    parser.add_argument("--seconds", type=float, help="Talos at the pole: one episode of this length, with memory alone")
     parser.add_argument(
         "--modes", default="memory,line,shift,cold", help="what may seed the solver (default: memory,line,shift,cold)"
     )
