@@ -2,7 +2,7 @@
 
 Both memories grow from the same few single steps, in the same bases, round by round. The active one asks of tasks it has not
 solved what a full step is still expected to gain after one iteration from its own guess: the solver's own figure, no optimum is
-needed. It takes those of largest expected gain, each one less likely near another that is taken in the same round.
+needed. It takes the tasks that tell most about where that gain is large, in the kernel of its own regression.
 """
 
 from __future__ import annotations
@@ -15,37 +15,38 @@ import numpy as np
 from engram.data.step_set import StepData
 from engram.data.steps import WALKS
 from engram.engine import engine
-from engram.learn.gpr import kernel_matrix
-from engram.learn.steps import FROM_WALK, INTO_WALK, StepTables, fit_regression
+from engram.learn.steps import FROM_WALK, INTO_WALK, StepTables, fit_regression, kernel
 from engram.study.report import Report
 from engram.study.steps import SETTINGS, TESTED, Tested, draw_tested, learnt_from, load_sets
 
 START, ADDED, ROUNDS, POOL = 40, 40, 8, 300  # steps of both feet together; tasks that are asked in every round
 RUNS = 3  # of both, from other first steps
-MEDIAN, TAIL = 0.5, 0.9  # quantiles of the suboptimality after one iteration
+TAIL = 0.9  # quantile of the suboptimality after one iteration
+
+
+COST, STOP, LENGTH = 0, 1, 2  # columns of the solver's log: cost, expected improvement of a full step, step length
 
 
 def after_one(problem: engine.TalosSteps, memory: engine.TalosStepMemory, step: tuple) -> tuple[float, float]:
-    """Cost after one iteration from the memory's guess (infinite if it leaves gaps), and what a full step still gains there."""
+    """Cost after one iteration from the memory's guess, and what a full step is still expected to gain there. A short step, which
+    leaves gaps, has no cost: it is that of the second iteration then, infinite if this is short too."""
     feet, goal, foot = step
     problem.set(feet, goal[None], foot)
     found = memory.query(feet, goal, foot, problem.x0)
     log = problem.solve(found["xs"], found["us"], iterations=2, stop=0.0)["log"]
-    return (float(log[0, 0]) if log[0, 2] == 1.0 else np.inf), (float(log[1, STOP]) if len(log) > 1 else 0.0)
+    closed = log[log[:, LENGTH] == 1.0, COST]
+    return (float(closed[0]) if len(closed) else np.inf), (max(0.0, float(log[1, STOP])) if len(log) > 1 else 0.0)
 
 
-STOP = 1  # column of the solver's log: expected improvement of a full step
-
-
-def spread_out(x: np.ndarray, gain: np.ndarray, length: np.ndarray, count: int) -> list[int]:
-    """Rows of x (n, d) by gain times what those taken before leave of the kernel's variance (pivoted Cholesky)."""
-    left, lower, chosen = np.ones(len(x)), np.zeros((count, len(x))), []
-    for k in range(count):
-        i = int(np.argmax(gain * left))
+def most_telling(covariance: np.ndarray, weight: np.ndarray, noise: float, count: int) -> list[int]:
+    """Rows of a Gaussian process (n, n), one by one that which leaves the least sum of `weight` (n) times variance."""
+    left, chosen = covariance.copy(), []
+    for _ in range(count):
+        told = weight @ left**2 / (np.diag(left) + noise)  # by which the sum falls
+        told[chosen] = -1.0
+        i = int(np.argmax(told))
         chosen.append(i)
-        column = kernel_matrix(x[i : i + 1], x, length, 1.0)[0]
-        lower[k] = (column - lower[:k, i] @ lower[:k]) / np.sqrt(max(left[i], 1e-12))
-        left = np.maximum(left - lower[k] ** 2, 0.0)
+        left -= np.outer(left[i], left[i]) / (left[i, i] + noise)
     return chosen
 
 
@@ -69,11 +70,15 @@ class Grower:
         return replace(self.tables, regression=regression).memory()
 
     def worst(self, rows: list[int], rng: np.random.Generator) -> list[int]:
-        """Steps to add where the memory of `rows` has most to gain."""
+        """Steps to add that tell most about where the memory of `rows` has most to gain. The gain is a square of what is off: its
+        root is the weight, or the few worst tasks would take all."""
         memory = self.memory(rows)
         pool = rng.choice(np.setdiff1d(np.arange(len(self.x)), rows), self.pool, replace=False)
-        gain = np.array([after_one(self.problem, memory, self.tasks[row])[1] for row in pool])
-        return [int(pool[i]) for i in spread_out(self.x[pool], gain, self.length, ADDED)]
+        weight = np.sqrt([after_one(self.problem, memory, self.tasks[row])[1] for row in pool])
+        known, told = self.x[rows], kernel(self.x[pool], self.x[rows], self.length)
+        within = kernel(known, known, self.length) + SETTINGS.noise * np.eye(len(rows))
+        covariance = kernel(self.x[pool], self.x[pool], self.length) - told @ np.linalg.solve(within, told.T)
+        return [int(pool[i]) for i in most_telling(covariance, weight, SETTINGS.noise, ADDED)]
 
     def anywhere(self, rows: list[int], rng: np.random.Generator) -> list[int]:
         """Steps to add at random."""
@@ -94,7 +99,7 @@ def grow(
     found = []
     for k in range(rounds):
         quality = grower.quality(rows, tested)
-        found.append((float(np.quantile(quality, MEDIAN)), float(np.quantile(quality, TAIL))))
+        found.append((float(np.median(quality)), float(np.quantile(quality, TAIL, method="higher"))))
         if k + 1 < rounds:
             rows += add(rows, rng)
     return found

@@ -17,7 +17,7 @@ from engram.learn.network import fit_ensemble
 from engram.learn.step_fit import nbytes
 from engram.learn.steps import StepTables, fit_regression
 from engram.study.report import Report
-from engram.study.step_train import StepTrain
+from engram.study.step_train import StepTrain, worth
 from engram.study.steps import (
     SETTINGS,
     TESTED,
@@ -34,7 +34,6 @@ from engram.study.steps import (
 ITERATIONS = 8
 SAMPLES = (100, 300, 1000)  # steps of a foot, half as many walks
 INDUCING = (64, 128, 256, 512, 880)  # samples of the regression: bytes
-TRAIN_POINTS, TRAIN_RANK = 24, 24
 HIDDEN, EPOCHS = 64, 100
 LEARNERS = ("knn", "gmr", "mlp", "tt", "gpr")
 
@@ -54,14 +53,11 @@ class Contest:
         self.learners, coded = learners, learners.tables.coded
         learners.add_neighbour()
         learners.add_mixture()
-        x, width = coded.x, coded.z.shape[1]
-        net = fit_ensemble(x, coded.z, hidden=HIDDEN, epochs=epochs)
+        net = fit_ensemble(coded.x, coded.z, hidden=HIDDEN, epochs=epochs)
         learners.add("mlp", network_table(net, **shared(coded)))
         regression = learners.tables.regression
         features = VARIED[:6]
-        self.trains = [StepTrain(regression, features, np.eye(15)[14] * foot, TRAIN_POINTS, TRAIN_RANK) for foot in (0, 1)]
-        self.evaluators = [engine.TensorTrain(train.table) for train in self.trains]
-        self.width = width
+        self.trains = [StepTrain(regression, features, np.eye(15)[14] * foot, worth(coded)) for foot in (0, 1)]
 
     def tables(self, name: str) -> list[Table]:
         """Of a learner, without the bases that all share."""
@@ -73,8 +69,7 @@ class Contest:
         """xs, us of a learner for the task that the problem poses."""
         if name != "tt":
             return self.learners.answer(name, task.step, problem.x0)
-        x = np.hstack([np.tile(task.step.features()[VARIED[:6]], (self.width, 1)), np.arange(self.width)[:, None]])
-        z = self.trains[task.foot].mean + self.evaluators[task.foot].value(x)[0]
+        z = self.trains[task.foot].z(task.step.features())
         found = self.learners.memory.decode(z, *task.step.asked, problem.x0)
         return found["xs"], found["us"]
 
