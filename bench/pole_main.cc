@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "bench/modes.h"
 #include "bench/pole_guided.h"
 #include "bench/stopwatch.h"
 #include "codegen/offline/pole_guide.h"
@@ -105,8 +106,7 @@ int main(int argc, char** argv) {
   engram_options options;
   engram_default_options(kModel, &options);
   options.clock = bench::thread_us;
-  options.memory = memory == "memory" ? ENGRAM_MODE_MEMORY : memory == "shift" ? ENGRAM_MODE_SHIFT : ENGRAM_MODE_COLD;
-  if (options.memory == ENGRAM_MODE_COLD && memory != "cold") bench::fail("engram-pole: memory is one of memory, shift, cold");
+  options.memory = bench::mode_of(memory);
   const auto open = [](const std::string& path) -> std::FILE* {
     std::FILE* const file = path.empty() ? nullptr : std::fopen(path.c_str(), "wb");
     if (!path.empty() && file == nullptr) bench::fail("engram-pole: cannot write " + path);

@@ -8,6 +8,8 @@
 // What the controller is not told: load=<kg> at the torso or base; friction=<mu> of the ground; delay=<s> from a command to its effect
 // (it is told of told=<s>); uneven=<m>: every touch-down is so much early or late, in turn for each foot (its ground is level, or raised by so much).
 //
+// memory=memory|shift|cold: what seeds the solver; random: a memory of random numbers, of talos_walk.
+//
 //   engram-trial <robot>_<task> limits       capture-point limits of pushes forward, back, left, right without a step [N s]
 //
 // Output: one row of kColumns doubles per control period (native byte order), see `Row`.
@@ -19,8 +21,9 @@
 #include <string>
 #include <vector>
 
-#include "bench/stopwatch.h"
+#include "bench/modes.h"
 #include "tests/support/legged_plant.h"
+#include "tests/support/random_walk.h"
 
 namespace {
 
@@ -48,9 +51,11 @@ struct Row {
   double status, rung, cost;
   double swing, com_wanted[3];           // feet asked to be in the air, bit f for foot f; m
   double foot[4][4], foothold[4][4];     // where feet are, and where they are asked to stand or land: x, y, z [m], heading [rad]
+  double gap;                            // that the plan's knots leave open, L1
+  double guesses, merit_shifted, merit;  // compared in this period, merit of the shifted plan and of the one that was taken
   double pose_us, linearize_us, backward_us, rollout_us, total_us;  // CPU time of the period
 };
-static_assert(sizeof(Row) == 55 * sizeof(double), "the reader counts on it (codegen/engram/prove/trial.py)");
+static_assert(sizeof(Row) == 59 * sizeof(double), "the reader counts on it (codegen/engram/prove/trial.py)");
 
 struct Event {
   double at;
@@ -103,12 +108,14 @@ int main(int argc, char** argv) {
       std::printf("%.17g\n", capture_limit(plant, chosen->feet, way[0], way[1]));
     return 0;
   }
+  std::string memory = "memory";
   double seconds = 5.0, heading = 0.0, load = 0.0, friction = 0.0, delay = 0.0, told = 0.0, uneven = 0.0;
   std::vector<Event> tasks, pushes;
   for (int i = 2; i < argc; ++i) {
     const std::string text = argv[i], key = text.substr(0, text.find('='));
     const char* const value = argv[i] + key.size() + 1;
     if (key == "seconds") seconds = std::atof(value);
+    else if (key == "memory") memory = value;
     else if (key == "heading") heading = std::atof(value) * M_PI / 180.0;
     else if (key == "task") tasks.push_back(event(value));
     else if (key == "load") load = std::atof(value);
@@ -120,19 +127,22 @@ int main(int argc, char** argv) {
     else bench::fail("engram-trial: unknown argument " + text);
   }
 
+  if (memory == "random" && chosen->model != &engram_talos_walk) bench::fail("engram-trial: memory=random is for talos_walk alone");
+  const engram_model* const model = memory == "random" ? engram::test::random_walk() : chosen->model;
   engram_options options;
-  engram_default_options(chosen->model, &options);
+  engram_default_options(model, &options);
   options.clock = bench::thread_us;
+  if (memory != "random") options.memory = bench::mode_of(memory);
   options.delay_us = static_cast<int64_t>(1e6 * told + 0.5);
-  LeggedPlant plant(chosen->model, heading);
+  LeggedPlant plant(model, heading);
   if (load > 0.0) plant.add_mass(chosen->pushed, load);
   if (friction > 0.0) plant.friction(friction);
   plant.delay(static_cast<int>(1e6 * delay / LeggedPlant::kStepUs + 0.5));
   std::vector<Ground> grounds(chosen->feet.size());
   for (size_t f = 1; f < grounds.size(); f += 2) grounds[f].raised = true;  // feet are not raised at the same time
-  LeggedController controller(chosen->model, &options);
+  LeggedController controller(model, &options);
   if (controller.error != ENGRAM_NO_ERROR) bench::fail(engram_error_text(controller.error));
-  const int64_t tick = engram_describe(chosen->model)->tick_us;
+  const int64_t tick = engram_describe(model)->tick_us;
   const auto foot = [&](size_t f) { return plant.data()->geom_xpos + 3 * mj_name2id(plant.model(), mjOBJ_GEOM, chosen->feet[f]); };
   std::vector<double> start;
   for (size_t f = 0; f < chosen->feet.size(); ++f) start.insert(start.end(), foot(f), foot(f) + 2);
@@ -173,6 +183,7 @@ int main(int argc, char** argv) {
     row.status = c.status, row.rung = c.rung, row.cost = c.cost, row.swing = c.legs.swing;
     row.pose_us = c.query_us, row.linearize_us = c.linearize_us, row.backward_us = c.backward_us, row.rollout_us = c.rollout_us;
     row.total_us = c.total_us;
+    row.gap = c.gap, row.guesses = c.nguess, row.merit_shifted = c.merit[0], row.merit = *std::min_element(c.merit, c.merit + std::max(1, c.nguess));
     std::memcpy(row.com, plant.com, sizeof row.com);
     std::memcpy(row.com_velocity, plant.com_velocity, sizeof row.com_velocity);
     std::memcpy(row.com_wanted, c.legs.com, sizeof row.com_wanted);

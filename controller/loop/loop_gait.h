@@ -63,9 +63,9 @@ template <class G> class Gait {
 
   // A stretch of the window in which the same feet stand.
   struct Phase {
-    int64_t first;         // slot
-    int slots;             // length; kEver: no end
-    unsigned swing;        // feet in the air
+    int64_t first = 0;     // slot
+    int slots = 0;         // length; kEver: no end
+    unsigned swing = 0;    // feet in the air
     Placement from[nfeet]; // at its beginning; of a standing foot for all of it
     Placement to[nfeet];   // at its end
     double zmp[2][2];      // centre of pressure at its two ends, linear between them [m]
@@ -87,6 +87,7 @@ template <class G> class Gait {
       offset_[f] = {c * dx + s * dy, -s * dx + c * dy, foot_[f].yaw - body.yaw};
     }
     support(0, foot_, zmp_);
+    swung_ = {};
     n_ = 0;
   }
 
@@ -97,7 +98,9 @@ template <class G> class Gait {
       if (n_ == 0 || phase_[0].covers(slot_ + 1)) continue;
       for (int f = 0; f < nfeet; ++f) foot_[f] = phase_[0].to[f];
       for (int i = 0; i < 2; ++i) zmp_[i] = phase_[0].zmp[1][i];
+      if (phase_[0].swing != 0) swung_ = phase_[0];
       cursor_ = after(cursor_, pace.walk);
+      if (!walking()) swung_ = {};
       first_ = slot_ + 1;
       plan(pace, 1);
     }
@@ -165,6 +168,10 @@ template <class G> class Gait {
     while (i + 1 < n_ && !phase_[i].covers(slot)) ++i;
     return phase_[i];
   }
+  // Phases of the window, and the last swing before it; none since the robot stood: no slots.
+  int phases() const { return n_; }
+  const Phase& phase(int i) const { return phase_[i]; }
+  const Phase& swung() const { return swung_; }
   // The body at a later slot.
   Placement body_at(int64_t slot, const Pace& pace) const {
     Placement b = body_;
@@ -256,7 +263,7 @@ template <class G> class Gait {
   Offset offset_[nfeet];          // of a foot from the body when it stands [m, rad]
   double zmp_[2] = {};            // as the phase under way began
   int n_ = 0;
-  Phase phase_[kPhases];
+  Phase phase_[kPhases], swung_;
 };
 
 }  // namespace engram

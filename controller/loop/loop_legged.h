@@ -96,6 +96,11 @@ template <class C> class LeggedModel {
 
   void tell(engram_legs& legs) const;
 
+  // Of a configuration whose memory continues plans (loop_continue.h).
+  template <class Extend> bool go_on(int kept, Memory& memory, Seed<P, N>& seed, Extend extend) const {
+    return memory.go_on(gait_, ground_, kept, seed, extend);
+  }
+
   const Gait<typename C::Gait>& gait() const { return gait_; }
 
  private:

@@ -25,7 +25,7 @@ inline constexpr int kPoleMaxPath = 512;   // numbers of a path
 // C: a configuration (loop_talos_pole.h) with `moved[nmoved]`, the driven dofs of the path, and hand(x, p, v).
 template <class C, class P, const PoleTables& tables> class PoleMemory {
  public:
-  static constexpr bool kRemembers = true;
+  static constexpr bool kRemembers = true, kContinues = false;
   static constexpr int kIterations = 3, kPatience = 10, kWays = 3;  // of a rival (loop_rival.h); neighbours offered in turn
   static constexpr int nq = P::nq, nv = P::nv, nu = P::nu, nmoved = C::nmoved;
 

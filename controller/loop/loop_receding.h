@@ -16,10 +16,12 @@
 //   static void path(const double* x, double p[3])                    the point of the robot that is reported along the plan [m]
 //   void tell(engram_legs&) const                                     where legs are asked to be; nothing for a robot without
 //
-// It need not have contacts, nor phases. A model whose M::Memory `kRemembers` has a rival to the shifted plan at every tick (loop_rival.h).
+// It need not have contacts, nor phases. A model whose M::Memory `kRemembers` has a rival to the shifted plan at every tick (loop_rival.h);
+// one whose memory `kContinues`, another guess of the knots that enter the horizon (loop_continue.h).
 #ifndef CONTROLLER_LOOP_LOOP_RECEDING_H_
 #define CONTROLLER_LOOP_LOOP_RECEDING_H_
 
+#include "controller/loop/loop_continue.h"
 #include "controller/loop/loop_core.h"
 #include "controller/loop/loop_rival.h"
 
@@ -50,21 +52,29 @@ template <class M> class RecedingPlanner : public PlannerCore<M, RecedingPlanner
   int64_t utime_[N + 1];
   Seed<P, N> seed_;
   Rival<M> rival_;
+  Continuation<M> continuation_;
 };
 
 // The trajectory before, on the new knot times, iterated and swept; a fresh one stands still. False if the solver failed.
 template <class M> bool RecedingPlanner<M>::iterate(const Plan<P, N>& before, bool fresh, Deadline& deadline) {
   const double* const x0 = solve_.horizon.x0;
   const auto extend = [&](int k, const double* x, double* u, double* x_next) { model_.extend(solve_.horizon, k, x, u, x_next); };
+  const Seed<P, N>* seed = &seed_;
   if (fresh) {
     std::memcpy(seed_.x[0], x0, sizeof(seed_.x[0]));
     for (int k = 0; k < N; ++k) extend(k, seed_.x[k], seed_.u[k], seed_.x[k + 1]);
   } else {
     resample(before, utime_, x0, seed_, extend);
+    if constexpr (M::Memory::kContinues) {
+      int kept = N;
+      while (kept > 0 && utime_[kept] > before.utime[before.n]) --kept;
+      if (options_.memory == ENGRAM_MODE_MEMORY && task_.known && kept < N)
+        seed = &continuation_.better(model_, solve_.horizon, kept, seed_, deadline, extend, cycle_);
+    }
   }
   std::memcpy(solve_.plan.utime, utime_, sizeof(utime_));
   solve_.plan.n = N;
-  solve_.start(seed_.x, seed_.u, fresh ? 0.0 : solve_.reg());
+  solve_.start(seed->x, seed->u, fresh ? 0.0 : solve_.reg());
   const int iterations = fresh ? options_.iterations_jump : options_.iterations;
   return solve_.improve(iterations - 1, deadline, [] {}) && solve_.ready();
 }
@@ -119,7 +129,7 @@ template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
   const bool cold = fresh || (options_.memory == ENGRAM_MODE_COLD && jumped_);
   cycle_.winner = cycle_.guess[0] = cold ? ENGRAM_CANDIDATE_COLD : ENGRAM_CANDIDATE_SHIFTED;
   if (iterate(postponed ? solve_.plan : plan_, cold, deadline)) {
-    cycle_.merit[0] = solve_.merit();
+    if (cycle_.nguess == 1) cycle_.merit[0] = solve_.merit();
     bool ready = true;
     if constexpr (M::Memory::kRemembers) {
       if (options_.memory == ENGRAM_MODE_MEMORY && task_.known && !fresh) ready = challenge(deadline);

@@ -19,7 +19,7 @@ namespace engram {
 
 // The memory of a model that has none.
 struct NoMemory {
-  static constexpr bool kRemembers = false;
+  static constexpr bool kRemembers = false, kContinues = false;
   static bool tables_fit() { return true; }
   static uint64_t table_digest() { return 0; }
 };

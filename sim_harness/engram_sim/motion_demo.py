@@ -18,7 +18,7 @@ from engram_sim.pair import Pair, Progress, plant_option, private_port, scene
 from engram_sim.results import Run, read_run, wilson
 
 MODE = "memory"  # what seeds the solver: the shifted plan, and a memory where the robot has one for the task
-BESIDE = {"talos_pole": ("shift", "cold")}  # run beside it, where a memory is asked at every period
+BESIDE = {"talos_pole": ("shift", "cold"), "talos_walk": ("shift", "cold")}  # run beside it, where a memory is asked as it goes
 LOG_EVERY = 40  # plant steps between two states of the log
 LOG_FULL = 10.0  # s of the log with every state
 PERCENTILES = {"p50": 50.0, "p99": 99.0, "p999": 99.9, "max": 100.0}

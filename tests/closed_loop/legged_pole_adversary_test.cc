@@ -4,15 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstring>
-#include <random>
-#include <vector>
 
 #include "controller/loop/loop_controller.h"
 #include "controller/loop/loop_receding.h"
 #include "controller/loop/loop_talos_pole.h"
 #include "tables/talos_pole/tables.h"
 #include "tests/support/legged_plant.h"
+#include "tests/support/random_tables.h"
 
 namespace engram::test {
 namespace {
@@ -23,33 +21,22 @@ constexpr PoleTables kRandomTables = {&random_knn, &random_path};
 using Model = LeggedModel<TalosPoleRemembers<kRandomTables>>;
 const engram_model kRandom = loop_model<Model, RecedingPlanner<Model>>("talos", "pole");
 
-// Every array but the domain and the scales becomes random numbers in [-size, size]; the digest is that of the new ones.
-class RandomTables : public testing::Environment {
+// Every array but the domain and the scales.
+class MakeUp : public testing::Environment {
  public:
   void SetUp() override {
-    random_knn.x = fill(random_knn.head, 3, 1.0f);
-    random_knn.value = fill(random_knn.head, 4, 3.0f);
-    random_path.mean = fill(random_path.head, 2, 1.5f);
-    random_path.basis = fill(random_path.head, 3, 0.5f);
-    random_knn.head.digest = tab_digest(&random_knn.head);
-    random_path.head.digest = tab_digest(&random_path.head);
+    random_knn.x = random_.fill(random_knn.head, 3, 1.0f);
+    random_knn.value = random_.fill(random_knn.head, 4, 3.0f);
+    random_path.mean = random_.fill(random_path.head, 2, 1.5f);
+    random_path.basis = random_.fill(random_path.head, 3, 0.5f);
+    RandomTables::sign(random_knn.head);
+    RandomTables::sign(random_path.head);
   }
 
  private:
-  const float* fill(TabHead& head, int array, float size) {
-    constexpr std::size_t line = 64 / sizeof(float);
-    std::vector<float>& numbers = numbers_.emplace_back(head.array[array].count + line);
-    std::uniform_real_distribution<float> within(-size, size);
-    for (float& number : numbers) number = within(rng_);
-    const auto past = reinterpret_cast<std::uintptr_t>(numbers.data()) / sizeof(float) % line;
-    const float* const at = numbers.data() + (past == 0 ? 0 : line - past);  // tables lie on cache lines
-    head.array[array].data = at;
-    return at;
-  }
-  std::mt19937 rng_{5};
-  std::vector<std::vector<float>> numbers_;
+  RandomTables random_;
 };
-testing::Environment* const kTables = testing::AddGlobalTestEnvironment(new RandomTables);
+testing::Environment* const kTables = testing::AddGlobalTestEnvironment(new MakeUp);
 
 constexpr double kRight[3] = {0.40, -0.53, 1.04}, kLeft[3] = {0.33, -0.06, 1.16}, kWay[3] = {0.12, -0.27, 1.0};
 

@@ -1,5 +1,6 @@
-// link: engram_talos_walk legged_plant
-// Talos in MuJoCo: walks at the commanded velocity, turns through the heading where angles jump, stops and stands.
+// link: engram_talos_walk legged_plant random_walk
+// Talos in MuJoCo: walks at the commanded velocity, turns through the heading where angles jump, stops and stands. Its memory of steps is
+// asked when a knot of a step enters the horizon; one of random numbers does no harm.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -7,6 +8,7 @@
 #include <utility>
 
 #include "tests/support/legged_plant.h"
+#include "tests/support/random_walk.h"
 
 namespace engram::test {
 namespace {
@@ -67,6 +69,70 @@ TEST(WalkTest, CommandsThatActLateAreAnsweredByAPrediction) {
   EXPECT_GT(up, 0.99);
   EXPECT_LT(torque, 0.9);
   EXPECT_GE(least_up(0).second, 1.0);  // its torques saturate
+}
+
+// What the memory said over some steps, while kKnots knots entered the horizon.
+constexpr int kKnots = 60;
+struct Tally {
+  int asked = 0, won = 0, worse = 0;
+  double up = 1.0, x = 0.0, y = 0.0;  // least; m, where the centre of mass came to
+};
+Tally walk(const engram_model* model, const double (&task)[4], engram_mode mode = ENGRAM_MODE_MEMORY) {
+  LeggedPlant plant(model, 0.4);
+  engram_options options;
+  engram_default_options(model, &options);
+  options.memory = mode;
+  LeggedController c(model, &options);
+  EXPECT_EQ(c.error, ENGRAM_NO_ERROR);
+  const double stand[4] = {};
+  EXPECT_EQ(engram_set_task(c.handle, 0, 1, stand, 4), ENGRAM_CONVERGED);
+  Tally tally;
+  for (int t = 0; t < 2500; ++t) {
+    if (t == 100) engram_set_task(c.handle, plant.utime, 2, task, 4);
+    if (t == 1500) plant.push("torso_2_joint", {0.0, 60.0, 0.0});
+    if (t == 1600) plant.push("torso_2_joint", {0.0, 0.0, 0.0});
+    const bool ticks = plant.utime % 10000 == 0;
+    c.step(plant);
+    tally.up = std::min(tally.up, plant.base_up());
+    const engram_cycle& cycle = c.cycle();
+    if (!ticks || cycle.nguess < 2) continue;
+    const bool memory = cycle.winner == ENGRAM_CANDIDATE_GPR;
+    ++tally.asked;
+    tally.won += memory;
+    tally.worse += !(cycle.merit[memory] <= cycle.merit[0]);
+  }
+  tally.x = plant.com[0];
+  tally.y = plant.com[1];
+  return tally;
+}
+
+TEST(WalkMemory, ContinuesThePlanAndIsNeverWorse) {
+  const Tally tally = walk(kModel, {0.3, 0.03, -0.2, 1.0});
+  EXPECT_GT(tally.up, 0.98);
+  EXPECT_GE(tally.asked, kKnots - 3);
+  EXPECT_GT(tally.won, tally.asked / 2);
+  EXPECT_EQ(tally.worse, 0);
+}
+
+// Backward, aside and around at once: steps that the memory has not learnt.
+TEST(WalkMemory, FarStepsAreWalkedByTheShiftedPlan) {
+  const Tally tally = walk(kModel, {-0.2, 0.1, 0.3, 1.0});
+  EXPECT_LT(tally.asked, kKnots - 15);
+  EXPECT_GT(tally.up, 0.98);
+}
+
+TEST(WalkMemory, TablesWithAnotherDigestAreRefused) {
+  EXPECT_EQ(LeggedController(random_walk(false)).error, ENGRAM_ERROR_TABLES);
+}
+
+TEST(WalkMemory, RandomTablesDoNoHarm) {
+  const Tally random = walk(random_walk(), {0.3, 0.03, -0.2, 1.0}), shift = walk(kModel, {0.3, 0.03, -0.2, 1.0}, ENGRAM_MODE_SHIFT);
+  EXPECT_GE(random.asked, kKnots - 3);
+  EXPECT_EQ(random.worse, 0);
+  EXPECT_EQ(shift.asked, 0);
+  EXPECT_GT(random.up, 0.98);
+  EXPECT_NEAR(random.x, shift.x, 0.01);
+  EXPECT_NEAR(random.y, shift.y, 0.01);
 }
 
 }  // namespace

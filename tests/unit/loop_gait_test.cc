@@ -7,6 +7,8 @@
 #include "controller/loop/loop_anymal.h"
 #include "controller/loop/loop_capture.h"
 #include "controller/loop/loop_talos.h"
+#include "controller/loop/loop_walk_memory.h"
+#include "tables/talos_step/task.h"
 
 namespace engram {
 namespace {
@@ -39,6 +41,44 @@ TEST(Swing, BeginsAndEndsAtRestOnTheGround) {
   const double h = 1e-4;  // rise 16 h_swing s^2: 1e-8 after a step of h
   EXPECT_LT(std::fabs(swing_placement(from, to, 0.06, h).p[2]), 1e-7);
   EXPECT_LT(std::fabs(swing_placement(from, to, 0.06, 1.0 - h).p[2]), 1e-7);
+}
+
+// The memory is asked for a whole walk from lead to rest: the knots of every step follow each other, its feet are those of the step before,
+// and what lies ahead when a slot enters the horizon is what was there when it is walked.
+TEST(WalkStep, KnotsAndFeetFollowEachOther) {
+  using Task = tasks::TalosStep;
+  Gait<TalosWalk::Gait> gait;
+  const Placement body = at(0.3, -0.2, 1.0), feet[2] = {moved(body, 0.0, 0.085), moved(body, 0.0, -0.085)};
+  gait.begin(0, feet, body);
+  constexpr int kAhead = 20, kSlots = 200;
+  StepTask step, last;
+  int knot, before = -1, steps = 0, knots = 0;
+  for (int64_t slot = 0; slot < kSlots; ++slot) {
+    const Pace pace = {0.3, 0.05, 0.2, slot < 100};
+    gait.advance(slot, pace);
+    gait.plan(pace, 60);
+    if (!walk_step<Task>(gait, slot + kAhead, 0.0, step, knot)) continue;
+    ++knots;
+    if (before < 0 || knot != before + 1) {
+      EXPECT_EQ(knot, before < 0 ? kAhead : step_first<Task>(step)) << "slot " << slot;
+      if (before >= 0) {
+        EXPECT_EQ(before, step_last<Task>(last) - 1) << "slot " << slot;
+        EXPECT_EQ(step.foot, 1 - last.foot);
+        EXPECT_TRUE(step.from_walk && last.into_walk);
+        for (int i = 0; i < 3; ++i) {
+          EXPECT_NEAR(step.feet[last.foot][i], last.goal[i], 1e-12);
+          EXPECT_NEAR(step.previous[i], last.feet[last.foot][i], 1e-12);
+          EXPECT_NEAR(step.goal[i], last.next[i], 1e-12);
+        }
+      }
+      ++steps;
+    }
+    before = knot;
+    last = step;
+  }
+  EXPECT_GT(steps, 5);
+  EXPECT_FALSE(last.into_walk);  // it came to rest
+  EXPECT_EQ(before, Task::nknots - 1);
 }
 
 // Whatever is commanded and however hard the push, no foot of Talos lands on the other one, across it, or out of reach.

@@ -16,7 +16,17 @@ PHASES = ["pose", "linearize", "backward", "rollout", "total"]
 VECTORS = ["com", "com_velocity"]
 SCALARS = ["up", "yaw", "slip", "torque", "status", "rung", "cost", *(f"{phase}_us" for phase in PHASES)]
 COLUMNS = [("time", 1), *((name, 3) for name in VECTORS), *((name, 1) for name in SCALARS[:7])]
-COLUMNS += [("swing", 1), ("com_wanted", 3), ("foot", 16), ("foothold", 16), *((name, 1) for name in SCALARS[7:])]
+COLUMNS += [
+    ("swing", 1),
+    ("com_wanted", 3),
+    ("foot", 16),
+    ("foothold", 16),
+    ("gap", 1),
+    ("guesses", 1),
+    ("merit_shifted", 1),
+    ("merit", 1),
+    *((name, 1) for name in SCALARS[7:]),
+]
 WIDTH = sum(n for _, n in COLUMNS)
 
 
@@ -29,7 +39,7 @@ class Trial:
     heading: float = 0.0
     tasks: tuple[tuple[float, tuple[float, ...]], ...] = ()
     pushes: tuple[tuple[float, tuple[float, float]], ...] = ()  # N s forward and left, in the axes of the start
-    faults: tuple[tuple[str, float], ...] = ()  # what the controller is not told: load, friction, delay, uneven
+    faults: tuple[tuple[str, float | str], ...] = ()  # what the controller is not told: load, friction, delay, uneven; its memory
 
     def arguments(self) -> list[str]:
         """Of engram-trial."""
