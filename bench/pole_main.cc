@@ -11,6 +11,8 @@
 // s since the guide took over, q, v, target (see codegen/engram/learn/pole.py).
 // first=N: motions N, N + 1, ... of the seed's; cycles=FILE: two doubles per control period of the second part, CPU time of the whole and
 // of the memory's answer [us].
+// witness=table|random: every answer that takes the shifted plan's place is rolled out beside it (pole_witness.h); `random`: the memory is
+// random numbers. queries=edge: targets at the edge of the task's domain; outside: the robot is pushed about, into states unknown to the memory.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -23,6 +25,7 @@
 
 #include "bench/modes.h"
 #include "bench/pole_guided.h"
+#include "bench/pole_witness.h"
 #include "bench/stopwatch.h"
 #include "codegen/offline/pole_guide.h"
 #include "tests/support/legged_plant.h"
@@ -38,6 +41,7 @@ using Task = engram::tasks::TalosPole;
 
 constexpr double kSettle = 4.0, kAlone = 4.0, kRest = 0.3;  // s, most time to get to the first point; s; s
 constexpr double kSpeed = 0.8;                              // m/s, slowest of a target that moves half of it
+constexpr double kPush = 40.0;                              // N, largest on the elbow, each way; a new one every 0.2 s
 constexpr double kStray = 1.2;                              // s, longest that a guided hand goes on its own before the guide leads
 
 struct Motion {
@@ -90,7 +94,7 @@ int main(int argc, char** argv) {
   int motions = 20, first = 0;
   uint64_t seed = 1;
   bool guided = false;
-  std::string memory = "memory", record, times;
+  std::string memory = "memory", record, times, witness, queries_of = "inside";
   for (int i = 1; i < argc; ++i) {
     const std::string text = argv[i], key = text.substr(0, text.find('=')), value = text.substr(std::min(text.size(), key.size() + 1));
     if (key == "motions") motions = std::atoi(value.c_str());
@@ -100,9 +104,12 @@ int main(int argc, char** argv) {
     else if (key == "cycles") times = value;
     else if (key == "guide") guided = value == "1";
     else if (key == "record") record = value;
-    else bench::fail("usage: engram-pole [motions=N] [seed=S] [memory=memory|shift|cold] [first=I] [cycles=FILE] [guide=1] [record=FILE]");
+    else if (key == "witness") witness = value;
+    else if (key == "queries") queries_of = value;
+    else bench::fail("usage: engram-pole [motions=N] [seed=S] [memory=memory|shift|cold] [first=I] [cycles=FILE] [guide=1] [record=FILE] [witness=table|random] [queries=inside|edge|outside]");
   }
-  const engram_model* const kModel = guided ? &engram_talos_pole_guided : &engram_talos_pole;
+  const engram_model* const kModel = guided ? &engram_talos_pole_guided : witness.empty() ? &engram_talos_pole : &engram_talos_pole_witness;
+  if (witness == "random") pole_random_tables();
   engram_options options;
   engram_default_options(kModel, &options);
   options.clock = bench::thread_us;
@@ -119,8 +126,14 @@ int main(int argc, char** argv) {
   const auto guide = std::make_unique<PoleGuide>();
   int successes = 0, done = 0;
   for (int n = 0; n < first + motions; ++n) {
-    const Motion m = draw(rng, astray);
+    Motion m = draw(rng, astray);
     if (n < first) continue;
+    if (queries_of == "edge") {
+      const int axis = n % 3;
+      m.to[axis] = n / 3 % 2 ? Task::task_lo[axis] : Task::task_hi[axis];
+      m.speed = 0.0;
+    }
+    std::mt19937_64 pushes(seed ^ static_cast<uint64_t>(n));
     LeggedPlant plant(kModel, 0.0);
     LeggedController controller(kModel, &options);
     if (controller.error != ENGRAM_NO_ERROR) bench::fail(engram_error_text(controller.error));
@@ -182,6 +195,10 @@ int main(int argc, char** argv) {
         rows.insert(rows.end(), plant.v.begin(), plant.v.end());
         rows.insert(rows.end(), m.to, m.to + 3);
       }
+      if (queries_of == "outside" && plant.utime % 200000 == 0) {
+        const double force[3] = {uniform(pushes, -kPush, kPush), uniform(pushes, -kPush, kPush), 0.0};
+        plant.push("arm_right_4_joint", force);
+      }
       const bool ticked = plant.utime % 10000 == 0;
       step();
       if (ticked) {
@@ -214,5 +231,7 @@ int main(int argc, char** argv) {
   };
   std::printf("total motions %d successes %d cycles %zu p50_us %.0f p99_us %.0f max_us %.0f query_p50_us %.1f query_p99_us %.1f\n", done, successes,
               cycles.size(), share(cycles, 0.5), share(cycles, 0.99), share(cycles, 1.0), share(queries, 0.5), share(queries, 0.99));
+  const PoleWitness& w = pole_witness();
+  if (!witness.empty()) std::printf("witness asked %ld accepted %ld above %ld worst %.4f\n", w.asked, w.accepted, w.above, w.worst);
   return 0;
 }

@@ -50,9 +50,11 @@ template <class M> class RecedingPlanner : public PlannerCore<M, RecedingPlanner
   int64_t origin_ = 0;  // us, whole knots end at origin_ + m kStepUs
   int64_t taken_ = -1;  // us, time of the task that the model has
   int64_t utime_[N + 1];
-  Seed<P, N> seed_;
   Rival<M> rival_;
   Continuation<M> continuation_;
+
+ protected:
+  Seed<P, N> seed_;  // the shifted plan, on this period's knot times
 };
 
 // The trajectory before, on the new knot times, iterated and swept; a fresh one stands still. False if the solver failed.
