@@ -38,14 +38,13 @@ template <class C, class P, const PoleTables& tables> class PoleMemory {
   }
   static uint64_t table_digest() { return (tables.knn->head.digest ^ tables.path->head.digest) * 0x100000001b3; }
 
-  // So near to a target that is clear of the pole, the pole cannot stand between it and the hand, and the pull is a quadratic one.
+  // The hand is where it shall be.
   template <class Target> static bool needless(const Target& target, const double* x0) {
     using Task = typename C::Task;
-    static_assert(Task::reach_near < Task::reach_clearance + 2.0 * std::min(Task::half[0][0], Task::half[0][1]), "narrower than a way across");
     double p[3], away2 = 0.0;
     C::hand(x0, p);
     for (int i = 0; i < 3; ++i) away2 += (p[i] - target.hand[i]) * (p[i] - target.hand[i]);
-    return away2 < Task::reach_near * Task::reach_near;
+    return away2 < Task::success_position * Task::success_position;
   }
 
   template <class Target, int N> bool guess(const Target& target, int64_t seq, const Plan<P, N>& shifted, Seed<P, N>& seed) {

@@ -97,7 +97,7 @@ template <class M> bool RecedingPlanner<M>::challenge(Deadline& deadline) {
   cycle_.guess[1] = ENGRAM_CANDIDATE_KNN;
   cycle_.merit[1] = rival_.merit();
   cycle_.nguess = 2;
-  if (!(rival_.merit() < solve_.merit())) return true;
+  if (!(rival_.merit() < solve_.merit() && rival_.cheaper(solve_))) return true;
   cycle_.winner = ENGRAM_CANDIDATE_KNN;
   return rival_.take_over(solve_);
 }

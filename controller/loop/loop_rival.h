@@ -3,16 +3,18 @@
 // A plan that has come to rest before an obstacle stays there: its shift is a local minimum, and an iteration leaves it where it is. A rival
 // starts elsewhere. It has M::Memory::kIterations iterations of each tick for M::Memory::kPatience ticks, its trajectory shifted in between
 // as the plan's is; then the memory is asked anew. It takes the plan's place as soon as its merit (cost + kMeritWeight * gaps) is below the
-// shifted plan's, and never otherwise. No switch_gain: waiting for a tenth less let a stuck arm push on into what it was stuck at.
+// shifted plan's and it costs no more rolled out (loop_rolled.h), and never otherwise. No switch_gain: waiting for a tenth less let a stuck
+// arm push on into what it was stuck at.
 // A memory has
 //
 //   static constexpr bool kRemembers;  static constexpr int kIterations, kPatience;
-//   static bool needless(target, x0)   true where the shifted plan alone finds its way: nothing is asked or iterated
+//   static bool needless(target, x0)   true where the shifted plan alone does: nothing is asked or iterated
 //   bool guess(target, seq, const Plan& shifted, Seed&)   a trajectory on the shifted plan's knot times and from its state; false: none.
 //                                                         seq counts ticks: those who know several ways offer them in turn
 #ifndef CONTROLLER_LOOP_LOOP_RIVAL_H_
 #define CONTROLLER_LOOP_LOOP_RIVAL_H_
 
+#include "controller/loop/loop_rolled.h"
 #include "controller/loop/loop_solve.h"
 
 namespace engram {
@@ -52,6 +54,12 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
   void forget() { age_ = 0; }
   double merit() const { return sound_ ? solve_.merit() : HUGE_VAL; }
   const FddpStats& stats() const { return solve_.stats; }
+  // Rolled out without gaps it costs no more than the shifted plan; one that does not stay finite costs more than any that does.
+  bool cheaper(const Solve<M>& shifted) const {
+    double cost[2];
+    loop_rolled(shifted.horizon, solve_.plan.s, shifted.plan.s, cost);
+    return std::isfinite(cost[0]) && !(cost[0] > cost[1]);
+  }
   // The rival becomes the plan, swept once more. False if that failed.
   bool take_over(Solve<M>& shifted) {
     age_ = 0;

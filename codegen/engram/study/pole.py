@@ -19,6 +19,8 @@ SEED = 2026  # neither that of the recording nor one that weights were tuned on
 MODES = {"memory": "with memory", "shift": "shifted plan only", "cold": "cold at the jump"}
 SHARD = 10  # motions of one process
 JOINT_SLACK = 1.0  # mrad that a joint may pass its limit by, as in the demo
+QUERIES = 10_000  # answers of the memory that are judged by a rollout, a third of them in each place
+PLACES = {"inside": "in the domain", "edge": "at its edge", "outside": "outside, pushed"}
 AIM = {"success": 0.98, "p50": 5000.0, "p99": 10000.0}  # issue 5
 
 
@@ -62,7 +64,34 @@ def run(row: str, quick: bool) -> None:
             report.say(f"never worse: of {asked} answers {worse} were taken that cost more than the shifted plan")
             report.figure("worse", worse, "1", asked)
     report.say("thesis: 100 Hz; without memory the hand stops in front of the pole")
+    if not quick:
+        never_worse(report)
     report.close()
+
+
+def never_worse(report: Report) -> None:
+    """Seeds that took the shifted plan's place, rolled out beside it (bench/pole_witness.cc); then random tables."""
+    for place, text in PLACES.items():
+        seen, first = np.zeros(3), 0  # asked, accepted, above
+        while seen[0] < QUERIES / len(PLACES):
+            found = shard("memory", first, SHARD, "witness=table", f"queries={place}")[0]
+            seen += witnessed(found)
+            first += SHARD
+        report.say(
+            f"rolled out, {text}: of {seen[0]:.0f} answers {seen[1]:.0f} taken, {seen[2]:.0f} of them above the shifted plan"
+        )
+        report.figure(f"rolled.{place}.above", seen[2], "1", int(seen[1]))
+    found = shard("memory", 0, SHARD, "witness=random")[0]
+    good = sum(row["success"] > 0 for row in motions(found))
+    asked, taken, _ = witnessed(found)
+    report.say(f"a table of random numbers: {taken:.0f} of {asked:.0f} answers taken, {good} of {SHARD} succeed")
+    report.figure("success.random", good / SHARD, "1", SHARD)
+
+
+def witnessed(text: str) -> np.ndarray:
+    """Answers of the memory, those that took the shifted plan's place, those of these that cost more rolled out."""
+    words = text.splitlines()[-1].split()
+    return np.array([float(words[words.index(key) + 1]) for key in ("asked", "accepted", "above")])
 
 
 def say_times(report: Report, outcome: Outcome) -> None:
@@ -82,36 +111,41 @@ def say_times(report: Report, outcome: Outcome) -> None:
 
 def run_modes(report: Report, count: int) -> dict[str, Outcome]:
     """Runs `count` motions in shards, kept in build/study/7.1/: what is there is not run again. Raises InputError."""
-    program = BUILD / "bin" / "engram-pole"
-    if not program.is_file():
-        raise InputError(f"no {relative(program)}; build it: TARGETS=engram-pole scripts/setup.sh")
-    folder = BUILD / "study" / "7.1" / hashlib.sha256(program.read_bytes()).hexdigest()[:12]
-    folder.mkdir(parents=True, exist_ok=True)
     rows: dict[str, list] = {mode: [] for mode in MODES}
     times: dict[str, list] = {mode: [] for mode in MODES}
     for first in range(0, count, SHARD):
         for mode in MODES:
             if mode != "memory" and first >= BESIDE:
                 continue
-            text, path = shard(program, folder, mode, first, min(SHARD, count - first))
-            rows[mode] += [read_row(line) for line in text.splitlines() if line.startswith("motion ")]
+            text, path = shard(mode, first, min(SHARD, count - first))
+            rows[mode] += motions(text)
             times[mode].append(np.fromfile(path).reshape(-1, 2))
         done = ", ".join(f"{mode} {sum(row['success'] > 0 for row in rows[mode])} of {len(rows[mode])}" for mode in MODES)
         report.say(f"so far: {done}")
     return {mode: Outcome(rows[mode], np.concatenate(times[mode])) for mode in MODES}
 
 
-def shard(program: Path, folder: Path, mode: str, first: int, many: int) -> tuple[str, Path]:
+def shard(mode: str, first: int, many: int, *options: str) -> tuple[str, Path]:
     """What engram-pole prints of motions `first` to `first + many`, and the file of its times. Raises InputError."""
-    name = f"{mode}_{SEED}_{first}_{many}"
+    program = BUILD / "bin" / "engram-pole"
+    if not program.is_file():
+        raise InputError(f"no {relative(program)}; build it: TARGETS=engram-pole scripts/setup.sh")
+    folder = BUILD / "study" / "7.1" / hashlib.sha256(program.read_bytes()).hexdigest()[:12]
+    folder.mkdir(parents=True, exist_ok=True)
+    name = "_".join([mode, str(SEED), str(first), str(many), *(option.replace("=", "-") for option in options)])
     said, path = folder / f"{name}.txt", folder / f"{name}.bin"
     if not said.is_file():
-        command = [program, f"motions={many}", f"first={first}", f"seed={SEED}", f"memory={mode}", f"cycles={path}"]
+        command = [program, f"motions={many}", f"first={first}", f"seed={SEED}", f"memory={mode}", f"cycles={path}", *options]
         done = subprocess.run(command, cwd=BUILD.parent, capture_output=True, text=True, check=False)
         if done.returncode != 0:
             raise InputError(f"{relative(program)}: {done.stderr.strip() or 'failed'}")
         said.write_text(done.stdout, encoding="utf-8")
     return said.read_text(encoding="utf-8"), path
+
+
+def motions(text: str) -> list[dict[str, float]]:
+    """The rows of engram-pole's motions."""
+    return [read_row(line) for line in text.splitlines() if line.startswith("motion ")]
 
 
 def read_row(line: str) -> dict[str, float]:
