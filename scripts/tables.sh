@@ -18,6 +18,11 @@ for description in models/*/*/task.toml; do
     scripts/setup.sh build
     continue
   fi
+  if [ "$robot/$task" = talos/pole ]; then
+    "$engram" pole
+    scripts/setup.sh build
+    continue
+  fi
   grep -q '^kind = "reach"' "$description" || continue  # another motion has no memory to fit
   "$engram" data "$robot" "$task"
   "$engram" fit "$robot" "$task"
