@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 import numpy as np
@@ -96,6 +97,25 @@ def test_the_same_bytes_as_from_the_pool_though_a_worker_dies(cluster, tmp_path)
     chunks = Chunks(tmp_path / "squares", "a", n=60, size=5)
     found = run(chunks, make_deadly_once, (tmp_path / "mark",), 1, "squares", cluster.address)
     assert np.array_equal(found["square"], np.arange(60) ** 2) and (tmp_path / "mark").exists()
+
+
+def test_a_result_that_was_lost_with_its_worker_is_asked_for_again(cluster, tmp_path, monkeypatch):
+    """As the package says it: the scheduler has forgotten the task."""
+    from distributed import Future
+
+    result, lost = Future.result, []
+
+    def lose_the_first(future, *arguments, **options):
+        if not lost:
+            lost.append(future.key)
+            raise CancelledError(future.key)
+        return result(future, *arguments, **options)
+
+    monkeypatch.setattr(Future, "result", lose_the_first)
+    mark = tmp_path / "mark"
+    mark.touch()
+    found = run(Chunks(tmp_path / "lost", "c", n=20, size=5), make_deadly_once, (mark,), 1, "squares", cluster.address)
+    assert lost and np.array_equal(found["square"], np.arange(20) ** 2)
 
 
 def test_work_that_fails_is_one_message(cluster, tmp_path):

@@ -6,7 +6,9 @@ The package `distributed` is imported here alone, and only when a cluster is ask
 import hashlib
 import logging
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator
+from concurrent.futures import CancelledError
 from pathlib import Path
 
 from engram.data.chunks import Arrays, Chunks
@@ -14,6 +16,7 @@ from engram.inputs import InputError
 from engram.paths import relative
 
 PATIENCE = 10  # s, for an answer of the scheduler
+RETRIES = 2  # of a chunk whose worker died
 
 _work: dict[tuple, Callable[[range], Arrays]] = {}  # of this worker process: what was made for a key, in each of its threads
 
@@ -70,8 +73,8 @@ def _check(client, address: str) -> None:
 def completed(chunks: Chunks, missing: list[range], make_work, arguments: tuple, address: str) -> Iterator[range]:
     """Fill the missing chunks on the cluster; yields the items of each as it is written.
 
-    A worker that dies loses nothing: the scheduler gives its chunks to others. Raises InputError if the cluster fails; what is
-    written is kept.
+    A worker that dies loses nothing: the scheduler gives its chunks to others, and what it had done but not yet sent is asked for
+    again. Raises InputError if the cluster fails; what is written is kept.
     """
     from distributed import as_completed
 
@@ -79,15 +82,27 @@ def completed(chunks: Chunks, missing: list[range], make_work, arguments: tuple,
     key = f"{chunks.folder.name} {chunks.key} {make_work.__qualname__}"  # what a solver depends on
     try:
         (shared,) = client.scatter([arguments], broadcast=True, hash=False)
-        futures = {client.submit(work_on, key, make_work, shared, items, pure=False, retries=2): items for items in missing}
-        for future in as_completed(futures):
+
+        def submit(items: range):
+            return client.submit(work_on, key, make_work, shared, items, pure=False, retries=RETRIES)
+
+        futures, lost = {submit(items): items for items in missing}, Counter()
+        running = as_completed(futures)
+        for future in running:
+            items = futures[future]
             try:
                 arrays = future.result()
             except Exception as error:  # of the work, of a worker that dies again and again, of the connection
-                where = relative(chunks.folder)
-                raise InputError(f"--cluster: {_text(error)}; run again to go on from what is in {where}") from None
-            chunks.write(futures[future], arrays)
-            yield futures[future]
+                lost[items] += 1
+                if not isinstance(error, CancelledError) or lost[items] > RETRIES:
+                    where = relative(chunks.folder)
+                    raise InputError(f"--cluster: {_text(error)}; run again to go on from what is in {where}") from None
+                again = submit(items)
+                futures[again] = items
+                running.add(again)
+                continue
+            chunks.write(items, arrays)
+            yield items
             future.release()
     finally:
         client.close(timeout=PATIENCE)
