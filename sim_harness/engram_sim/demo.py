@@ -1,6 +1,7 @@
 """The demo: one task series, several modes of the controller, and what came out of it."""
 
 import argparse
+import itertools
 import json
 import os
 import time
@@ -22,7 +23,7 @@ from engram_sim.series import write_reach
 JUMPS = 300  # of a series, unless told otherwise
 LOG_EVERY = 40  # plant steps between two states (and cycles) of the log: 25 a second, as many as the video shows
 LOG_TRUNCATED = 3  # exit code of engram-plant: all done, but the disk was full
-SLOWEST_FIRST = ("cold", "shift", "line", "memory")  # so that no long run is left alone at the end
+SLOWEST_FIRST = ("memory", "cold", "shift", "line")  # so that no long run is left alone at the end
 
 
 def demo(args: argparse.Namespace) -> int:
@@ -37,12 +38,27 @@ def demo(args: argparse.Namespace) -> int:
     return motion_demo.demo(args, run_folder(args.out))
 
 
-def run_folder(out: Path | None) -> Path:
-    """The folder of a new run, which runs/latest then shows to."""
-    folder = (out or ROOT / "runs" / time.strftime("%Y-%m-%d-%H%M%S")).resolve()
-    folder.mkdir(parents=True, exist_ok=True)
+def run_folder(out: Path | None, runs: Path = ROOT / "runs") -> Path:
+    """The folder of a new run: `out`, or one of the date in `runs`. `latest` beside it then shows to it."""
+    if out:
+        folder = out.resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+    else:
+        folder = new_folder(runs / time.strftime("%Y-%m-%d-%H%M%S"))
     point_latest(folder)
     return folder
+
+
+def new_folder(wanted: Path) -> Path:
+    """`wanted`, made now; `wanted`-2, -3, ... if another run began in the same second."""
+    wanted.parent.mkdir(parents=True, exist_ok=True)
+    for n in itertools.count(1):
+        folder = wanted if n == 1 else wanted.with_name(f"{wanted.name}-{n}")
+        try:
+            folder.mkdir()
+            return folder
+        except FileExistsError:
+            continue
 
 
 def reach_demo(args: argparse.Namespace) -> int:
@@ -104,12 +120,13 @@ def run_modes(args: argparse.Namespace, modes: list[str], folder: Path, series: 
 
 
 def point_latest(folder: Path) -> None:
-    """Let runs/latest show to `folder`, if it lies beside it."""
+    """Let runs/latest show to `folder`, if it lies beside it. In one step: another demo may do the same at this moment."""
     latest = folder.parent / "latest"
-    if latest.is_symlink():
-        latest.unlink()
-    if not latest.exists():
-        os.symlink(folder.name, latest)
+    if latest.exists() and not latest.is_symlink():
+        return
+    own = folder.parent / f".latest-{folder.name}"
+    os.symlink(folder.name, own)
+    own.replace(latest)
 
 
 def finish(

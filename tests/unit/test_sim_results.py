@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 from engram.inputs import InputError
 from engram_sim import eventlog
+from engram_sim.demo import run_folder
 from engram_sim.results import enumerators, figures, figures_name, read_csv, read_run, wilson
 from engram_sim.suboptimality import ITERATIONS, read_jumps, suboptimality
 
@@ -106,3 +108,11 @@ def test_summary_counts_and_times(tmp_path: Path) -> None:
 def test_missing_results_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="interrupted"):
         read_run("memory", tmp_path)
+
+
+def test_runs_of_the_same_second_have_folders_of_their_own(tmp_path: Path) -> None:
+    with ThreadPoolExecutor(8) as pool:
+        folders = list(pool.map(lambda _: run_folder(None, tmp_path / "runs"), range(24)))
+    assert len(set(folders)) == len(folders) and all(folder.is_dir() for folder in folders)
+    assert (tmp_path / "runs" / "latest").resolve() in folders
+    assert sorted(path.name for path in (tmp_path / "runs").iterdir() if path.name.startswith(".")) == []
