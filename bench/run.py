@@ -405,7 +405,7 @@ class Bench:
         """Samples of random positive trains (figure 7.18); the gate: the probability of what we draw."""
         import trains
 
-        from engram.study.sampling import Sides
+        from engram.study.sampling import Sides, calls_of
 
         self.figures.title(
             "tt: samples of a train, alpha 0.9, beside PyTorch (algorithm 6 as printed; tuned) and teneva (alpha 0)"
@@ -416,13 +416,13 @@ class Bench:
             self.all_hold &= holds
             for count in counts:
                 allocated = heap.Count()
-                us = {name: Samples(values) for name, values in sides.times_us(count, min(self.rounds, 3)).items()}
+                us = {name: Samples(values) for name, values in sides.times_us(count, self.rounds).items()}
                 for name, key in (("pytorch", "sample"), ("tuned", "sample_tuned"), ("teneva", "sample_teneva")):
                     if name in us:
                         self.figures.add("tt", f"{key}.{case.name(count)}", us["ours"], us[name], holds, None)
                 work = (sides.ours.bytes, case.operations(count), us["ours"], case.bytes_read(count))
                 self.facts(f"tt.sample.{case.name(count)}", *work)
-                self.allocations(f"tt.sample.{case.name(count)}", allocated.calls, len(us["ours"].us))
+                self.allocations(f"tt.sample.{case.name(count)}", allocated.calls, calls_of(count) * len(us["ours"].us))
 
     def networks(self, worker) -> None:
         """Ensembles and mixture density networks."""

@@ -12,6 +12,8 @@
 #include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
+#include <limits>
+
 namespace engram::binding {
 namespace {
 
@@ -117,13 +119,13 @@ Out density(const StudyCost& cost, const In<2>& x) {
   return p.release();
 }
 
-nb::tuple refine(const StudyCost& cost, const In<2>& x, int evaluations) {
+nb::tuple refine(const StudyCost& cost, const In<2>& x, int evaluations, double enough) {
   check_shape<2>("x", x, {-1, cost.d()});
   NewArray out({x.shape(0), x.shape(1)}), c({x.shape(0)});
   std::copy_n(x.data(), x.size(), out.data());
   {
     nb::gil_scoped_release release;
-    cost.refine(out.data(), x.shape(0), evaluations, c.data());
+    cost.refine(out.data(), x.shape(0), evaluations, enough, c.data());
   }
   return nb::make_tuple(out.release(), c.release());
 }
@@ -184,7 +186,8 @@ nb::tuple cross(const StudyCost& cost, const std::vector<int>& points, const In<
     std::vector<double> x;
     const auto f = [&](const int32_t* at, std::size_t m, double* value) {
       x.resize(m * d);
-      for (std::size_t i = 0; i < m * d; ++i) x[i] = cost.lo[i % d] + at[i] * step[i % d];
+      for (std::size_t i = 0; i < m; ++i)
+        for (int k = 0; k < d; ++k) x[i * d + k] = cost.lo[k] + at[i * d + k] * step[k];
       cost.density(x.data(), m, value);
     };
     train = offline::tt_cross(f, points, index, options, evaluations);
@@ -216,8 +219,8 @@ void bind_study(nb::module_& engine) {
       .def("evaluate", &evaluate, "x"_a, "Cost (m) at x (m, d).")
       .def("gradient", &gradient, "x"_a, "Cost (m) and gradient (m, d) at x (m, d).")
       .def("density", &density, "x"_a, "Density (m) at x (m, d).")
-      .def("refine", &refine, "x"_a, "evaluations"_a = 100,
-           "x (m, d) with all but the task moved downhill by projected BFGS, and the cost (m) there.")
+      .def("refine", &refine, "x"_a, "evaluations"_a = 100, "enough"_a = -std::numeric_limits<double>::infinity(),
+           "x (m, d) with all but the task moved downhill by projected BFGS, until its cost is `enough`; and the cost (m) there.")
       .def("cross", &cross, "points"_a, "starts"_a, "rank"_a, "enrich"_a = 8, "sweeps"_a = 4, "tolerance"_a = 1e-8, "seed"_a = 1, "spread"_a = 0,
            "Cores of a tensor train of the density on a grid of `points`, grown from `starts` (m, d); and how many values it took.");
   engine.def("study_arm", &arm, "name"_a, "from_"_a = std::vector<double>{}, "to"_a = std::vector<double>{},

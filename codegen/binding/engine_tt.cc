@@ -60,13 +60,18 @@ class TensorTrain {
     return nb::make_tuple(x.release(), log_prob.release());
   }
 
-  // Processor time of each of `repeats` calls [us]: `count` samples, a seed of its own each
-  NewArray time_us(double alpha, int count, std::size_t repeats) {
+  // Processor time of a call that draws `count` samples [us], `repeats` times: every call has a seed of its own, and the clock is read
+  // around `calls` of them, which share what that costs.
+  NewArray time_us(double alpha, int count, std::size_t repeats, std::size_t calls) {
     if (count < 1 || count > sampler_.capacity) throw nb::value_error("count: 1 .. capacity");
+    if (calls < 1) throw nb::value_error("calls: at least 1");
     std::vector<double> x(std::size_t(count) * tab_->d);
     NewArray us({repeats});
+    uint64_t seed = 0;
     for (std::size_t i = 0; i < repeats; ++i)
-      us.data()[i] = timed_us([&] { (void)tab_tt_sample(&sampler_, alpha, count, i, x.data(), nullptr); });
+      us.data()[i] = timed_us([&] {
+        for (std::size_t j = 0; j < calls; ++j) (void)tab_tt_sample(&sampler_, alpha, count, seed++, x.data(), nullptr);
+      }) / double(calls);
     return us;
   }
 
@@ -97,8 +102,12 @@ void bind_tensor_train(nb::module_& engine) {
       .def("distance", &TensorTrain::distance, "p"_a, "(signed distance (m), gradient (m, 3), status (m)) of a train over x, y, z.")
       .def("condition", &TensorTrain::condition, "x"_a, "fixed"_a, "Conditions on the variables that are fixed; the status.")
       .def("sample", &TensorTrain::sample, "alpha"_a, "count"_a, "seed"_a = 1, "(x (count, d), log probability (count)).")
-      .def("time_us", [](TensorTrain& t, double alpha, int count, std::size_t repeats) { return t.time_us(alpha, count, repeats).release(); },
-           "alpha"_a, "count"_a, "repeats"_a, "Processor time of calls that draw `count` samples [us].")
+      .def("time_us",
+           [](TensorTrain& t, double alpha, int count, std::size_t repeats, std::size_t calls) {
+             return t.time_us(alpha, count, repeats, calls).release();
+           },
+           "alpha"_a, "count"_a, "repeats"_a, "calls"_a = 1,
+           "Processor time of a call that draws `count` samples [us], each the mean of `calls` one after the other.")
       .def_prop_ro("bytes", &TensorTrain::bytes, "Bytes of the table's arrays.")
       .def_prop_ro("sampler_bytes", &TensorTrain::sampler_bytes, "Bytes of the sampler's memory.");
 }

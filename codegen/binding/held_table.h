@@ -8,8 +8,10 @@
 #include <nanobind/ndarray.h>
 #include <nanobind/stl/string.h>
 
+#include <cstdlib>
 #include <cstring>
-#include <deque>
+#include <memory>
+#include <new>
 #include <string>
 #include <vector>
 
@@ -20,6 +22,10 @@ namespace nb = nanobind;
 // Every kind's struct is a TabHead, then its scalars (32-bit integers and floats, as fields() lists them), then pointers to its arrays
 // behind the domain: so one class fills them all.
 class HeldTable {
+  struct Free {
+    void operator()(void* p) const { std::free(p); }
+  };
+
  public:
   HeldTable(const nb::object& source, uint64_t robot_digest, uint64_t task_digest)
       : name_(nb::cast<std::string>(source.attr("role"))) {
@@ -34,7 +40,9 @@ class HeldTable {
     for (nb::handle item : source.attr("arrays")()) {
       if (head.narray == TAB_ARRAYS) throw nb::value_error("too many arrays in a table");
       const auto words = nb::cast<nb::ndarray<const uint32_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>>(item.attr("words"));
-      void* const data = arrays_.emplace_back(words.size()).data();
+      const std::size_t bytes = (4 * words.size() + 63) / 64 * 64;
+      void* const data = arrays_.emplace_back(std::aligned_alloc(64, bytes > 0 ? bytes : 64)).get();
+      if (!data) throw std::bad_alloc();
       std::memcpy(data, words.data(), 4 * words.size());
       head.array[head.narray++] = {"", data, words.size()};
     }
@@ -68,7 +76,7 @@ class HeldTable {
 
  private:
   std::string name_;
-  std::deque<std::vector<uint32_t>> arrays_;  // deque: growing moves nothing
+  std::vector<std::unique_ptr<void, Free>> arrays_;  // aligned to cache lines, as in a generated file
   std::vector<uint64_t> struct_;              // eight bytes: aligned for pointers
 };
 

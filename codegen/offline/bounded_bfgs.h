@@ -11,13 +11,13 @@
 namespace engram::offline {
 
 // Minimizes f over the variables first .. d - 1 of x (d), within lo and hi, from x in place; returns f there. f(x, gradient) gives value
-// and gradient. At most `evaluations` of them, one per step that is tried.
+// and gradient. At most `evaluations` of them, one per step that is tried; no more once every lane is at `enough` or below.
 //   step = alpha P(-H g),   P: variables at a bound that the gradient pushes through it stay, the others stop at it
 // H follows BFGS where s'y > 0, starts as the squares of the ranges scaled to a first step of a tenth, and starts again where the
 // search along -H g has shrunk to nothing. Armijo's condition with halving; every lane for itself.
 // Source: Nocedal & Wright, Numerical Optimization (2006), chapters 6 and 16.7.
 template <class S, class F>
-S bounded_bfgs(const F& f, const std::vector<double>& lo, const std::vector<double>& hi, int first, int evaluations, S* x) {
+S bounded_bfgs(const F& f, const std::vector<double>& lo, const std::vector<double>& hi, int first, int evaluations, double enough, S* x) {
   constexpr double kArmijo = 1e-4, kShortest = 1e-4, kCurvature = 1e-12, kDone = 1e-9;
   const int d = int(lo.size()), n = d - first;
   std::vector<S> H(n * n), g(d), x_try(x, x + d), g_try(d), dir(n), s(n), y(n), Hy(n);
@@ -97,7 +97,7 @@ S bounded_bfgs(const F& f, const std::vector<double>& lo, const std::vector<doub
     restart(stuck);
     alpha = select(stuck, one, alpha);
     bool done = true;
-    for (int l = 0; l < lanes_of<S>; ++l) done &= -lane(slope, l) < kDone;
+    for (int l = 0; l < lanes_of<S>; ++l) done &= -lane(slope, l) < kDone || lane(cost, l) <= enough;
     if (done) break;
     (void)change;
   }

@@ -26,8 +26,9 @@ class StudyCost {
       p[i] = complement ? 1 - c : std::exp(-(power == 1 ? scale * c : scale * scale * c * c));
     }
   }
-  // Moves the variables behind the task downhill, in place, with at most `evaluations` of cost and gradient; c (m): where it ends.
-  virtual void refine(double* x, std::size_t m, int evaluations, double* c) const = 0;
+  // Moves the variables behind the task downhill, in place, with at most `evaluations` of cost and gradient; what costs no more than
+  // `enough` need not move on. c (m): where it ends.
+  virtual void refine(double* x, std::size_t m, int evaluations, double enough, double* c) const = 0;
 
   std::vector<double> lo, hi;
   int ntask = 0;
@@ -54,11 +55,11 @@ template <class F, class S> class StudyCostOf : public StudyCost {
     }
   }
 
-  void refine(double* x, std::size_t m, int evaluations, double* c) const override {
+  void refine(double* x, std::size_t m, int evaluations, double enough, double* c) const override {
     std::vector<S> at(d());
     for (std::size_t i = 0; i < m; i += lanes_of<S>) {
       load(x, m, i, at.data());
-      const S value = bounded_bfgs<S>(f_, lo, hi, ntask, evaluations, at.data());
+      const S value = bounded_bfgs<S>(f_, lo, hi, ntask, evaluations, enough, at.data());
       for (std::size_t l = 0; l < lanes_of<S> && i + l < m; ++l) {
         c[i + l] = lane(value, int(l));
         for (int k = ntask; k < d(); ++k) x[(i + l) * d() + k] = lane(at[k], int(l));

@@ -75,6 +75,10 @@ template <class F> inline auto tab_with_type(int32_t type, F f) {
 }
 
 inline float tab_sum(const TabLanes& v) { return ((v[0] + v[4]) + (v[2] + v[6])) + ((v[1] + v[5]) + (v[3] + v[7])); }
+inline float tab_max(const TabLanes& v) {
+  const auto larger = [](float a, float b) { return a > b ? a : b; };
+  return larger(larger(larger(v[0], v[4]), larger(v[2], v[6])), larger(larger(v[1], v[5]), larger(v[3], v[7])));
+}
 
 // Squared distances of the scaled query to the eight samples of one block (d, 8). Two accumulators hide the latency of the additions.
 inline TabLanes tab_block_distance2(const float* block, const float* query, int32_t d) {

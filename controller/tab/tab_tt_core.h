@@ -47,15 +47,18 @@ inline TtPoint tt_point(const TabTt* tab, int32_t k, double x) {
 // number `at`.
 template <int type, int G, int V>
 inline void tt_product(const float* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out) {
-  TabLanes sum[G][V] = {};
+  TabLanes sum[G][V];
+#pragma GCC unroll 32
+  for (int i = 0; i < G * V; ++i) sum[i / V][i % V] = TabLanes{};
   for (int32_t j = 0; j < rows; ++j) {
     TabLanes m[V];
+#pragma GCC unroll 8
     for (int v = 0; v < V; ++v) m[v] = tab_load_as<type>(data, at + static_cast<int64_t>(j) * width + c + v * TAB_LANES);
-    for (int g = 0; g < G; ++g)
-      for (int v = 0; v < V; ++v) sum[g][v] += m[v] * row[j * G + g];
+#pragma GCC unroll 32
+    for (int i = 0; i < G * V; ++i) sum[i / V][i % V] += m[i % V] * row[j * G + i / V];
   }
-  for (int g = 0; g < G; ++g)
-    for (int v = 0; v < V; ++v) tab_store(out[g] + c + v * TAB_LANES, sum[g][v]);
+#pragma GCC unroll 32
+  for (int i = 0; i < G * V; ++i) tab_store(out[i / V] + c + i % V * TAB_LANES, sum[i / V][i % V]);
 }
 
 // The same for a number of vectors that is known when it runs: 1 .. V.
@@ -131,8 +134,7 @@ inline int32_t tt_rescale(float* v, int32_t n) {
     const TabLanes a = tab_load(v + i), size = a < 0.0f ? -a : a;
     top = size > top ? size : top;
   }
-  float largest = 0;
-  for (int l = 0; l < TAB_LANES; ++l) largest = top[l] > largest ? top[l] : largest;
+  float largest = tab_max(top);
   for (; i < n; ++i) largest = std::fabs(v[i]) > largest ? std::fabs(v[i]) : largest;
   uint32_t bits;
   std::memcpy(&bits, &largest, sizeof bits);
@@ -141,7 +143,8 @@ inline int32_t tt_rescale(float* v, int32_t n) {
   const uint32_t inverse_bits = static_cast<uint32_t>(254 - biased) << 23;
   float inverse;
   std::memcpy(&inverse, &inverse_bits, sizeof inverse);
-  for (i = 0; i < n; ++i) v[i] *= inverse;
+  for (i = 0; i + TAB_LANES <= n; i += TAB_LANES) tab_store(v + i, tab_load(v + i) * inverse);
+  for (; i < n; ++i) v[i] *= inverse;
   return biased - 127;
 }
 

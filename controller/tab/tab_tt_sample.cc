@@ -6,7 +6,7 @@ using namespace engram;
 
 namespace {
 
-// x^power for x in [0, 1], power >= 1; 0 where that is below 2^-126. By log2 and exp2 of the eight lanes: relative error below
+// x^power for x in [2^-126, 1] whose power is at least 2^-126, or x = 0. By log2 and exp2 of the eight lanes: relative error below
 // (3 + power) 1e-6.
 TabLanes power_of(const TabLanes& x, float power) {
   typedef int32_t Words __attribute__((vector_size(sizeof(TabLanes))));
@@ -31,8 +31,34 @@ TabLanes power_of(const TabLanes& x, float power) {
   TabLanes scale;
   std::memcpy(&scale, &scale_bits, sizeof scale);
   const TabLanes zero{};
-  return y > low ? two_f * scale : zero;
+  return x > zero ? two_f * scale : zero;
 }
+
+// x^power for a whole number > 0, by repeated squaring: relative error below power 2^-24. No step is smaller than the result.
+TabLanes power_of(TabLanes x, int32_t power) {
+  for (; !(power & 1); power >>= 1) x *= x;
+  TabLanes y = x;
+  while (power >>= 1) {
+    x *= x;
+    if (power & 1) y *= x;
+  }
+  return y;
+}
+
+// The exponent of a call, 1 / (1 - alpha).
+struct Power {
+  float beta;
+  int32_t whole;  // beta, where it is a small whole number: for alpha = 0, 1/2, 3/4, 0.8, 0.9 it is; else 0
+  float least;    // x below it gives 0: its power is below 2^-126, and numbers so small take some processors a hundred cycles each
+  bool greedy;    // the largest alone
+
+  explicit Power(double alpha) {
+    greedy = alpha >= 1 - 1e-6;
+    beta = greedy ? 1.0f : static_cast<float>(1 / (1 - std::fmax(alpha, 0.0)));
+    whole = beta <= 64 && beta == std::floor(beta) ? static_cast<int32_t>(beta) : 0;
+    least = std::exp2(-126.0f / beta);
+  }
+};
 
 // pi_k (rows) and W_k (rows, pad(n)) of one core from pi_k+1
 void marginal_of(const TtCore& core, const float* pi_next, float* W, float* pi) {
@@ -59,35 +85,27 @@ void row_at(const TtCore& core, const TtPoint& at, const float* row, float* out)
 struct Choice {
   alignas(64) float p[TAB_TT_MAX_N];
   int32_t n, n_pad, largest;  // largest: index of the largest p
-  TabLanes lanes;             // sums of p over the points i = lane (mod 8)
-  float total;
+  float up_to[TAB_LANES];     // sums of p over the points i = 0 .. lane (mod 8)
+  float total;                // the last of them
   bool greedy;
 
-  // From p = row W: |p|, scaled to a largest entry of 1, to the power beta; uniform if all vanish. Greedy: the largest alone.
-  void prepare(float beta, bool largest_only) {
-    greedy = largest_only;
+  // From p = row W: |p|, scaled to a largest entry of 1, to the power beta; uniform if all are below 2^-126. Greedy: the largest alone.
+  void prepare(const Power& power) {
     TabLanes top{};
     for (int32_t i = 0; i < n_pad; i += TAB_LANES) {
       const TabLanes v = tab_load(p + i), a = v < 0.0f ? -v : v;
       tab_store(p + i, a);
       top = a > top ? a : top;
     }
-    float most = 0;
-    for (int l = 0; l < TAB_LANES; ++l) most = top[l] > most ? top[l] : most;
-    lanes = TabLanes{};
-    if (!(most > 0) || !std::isfinite(most)) {
+    float most = tab_max(top);
+    if (!(most >= 0x1p-126f) || !std::isfinite(most)) {
       for (int32_t i = 0; i < n_pad; ++i) p[i] = i < n ? 1.0f : 0.0f;
       most = 1;
-      beta = 1;
     }
-    const float inverse = 1 / most;
-    for (int32_t i = 0; i < n_pad; i += TAB_LANES) {
-      TabLanes q = tab_load(p + i) * inverse;
-      if (beta != 1.0f) q = power_of(q, beta);
-      tab_store(p + i, q);
-      lanes += q;
-    }
-    total = tab_sum(lanes);
+    const TabLanes lanes = power.whole ? raise(1 / most, power.least, power.whole) : raise(1 / most, power.least, power.beta);
+    total = 0;
+    for (int l = 0; l < TAB_LANES; ++l) up_to[l] = total += lanes[l];
+    greedy = power.greedy;
     if (greedy) {
       largest = 0;
       for (int32_t i = 1; i < n; ++i)
@@ -95,24 +113,39 @@ struct Choice {
     }
   }
 
-  // The point of the uniform number u: first the lane, then the block.
+  // The point of the uniform number u: first the lane, then the block. Sums are counted, not searched: no branch depends on them.
   int32_t draw(float u) const {
     if (greedy) return largest;
-    float left = u * total;
-    int lane = 0;
-    while (lane < TAB_LANES - 1 && left >= lanes[lane]) left -= lanes[lane++];
-    int32_t found = -1;
+    float left = u * total, before = 0;  // left < total, being u < 1: the last lane is chosen only if something is there
+    int32_t lane = 0;
+    for (int l = 0; l < TAB_LANES - 1; ++l) {
+      lane += left >= up_to[l];
+      before = left >= up_to[l] ? up_to[l] : before;
+    }
+    left -= before;
+    float sum = 0;
+    int32_t found = lane;
     for (int32_t i = lane; i < n_pad; i += TAB_LANES) {
-      if (p[i] <= 0) continue;
-      found = i;
-      if (left < p[i]) break;
-      left -= p[i];
+      sum += p[i];
+      found += left >= sum ? TAB_LANES : 0;
     }
-    if (found >= 0) return found;
-    // rounding has left an empty lane: the first point there is
-    for (found = 0; found < n - 1 && p[found] <= 0; ++found) {
-    }
+    if (found < n_pad) return found;
+    do found -= TAB_LANES;  // rounding: the last one there is
+    while (found > lane && p[found] <= 0);
     return found;
+  }
+
+ private:
+  // p = (p inverse)^power; returns the sums of p over the points i = lane (mod 8).
+  template <class P> TabLanes raise(float inverse, float least, P power) {
+    TabLanes lanes{};
+    const TabLanes zero{};
+    for (int32_t i = 0; i < n_pad; i += TAB_LANES) {
+      const TabLanes x = tab_load(p + i) * inverse, q = power_of(x >= least ? x : zero, power);
+      tab_store(p + i, q);
+      lanes += q;
+    }
+    return lanes;
   }
 };
 
@@ -195,7 +228,7 @@ int32_t split(TabTtSampler& s, const Choice& choice, int32_t g, int32_t k, uint6
 void descend(TabTtSampler& s, const TtCore& core, int32_t nchild) {
   if (nchild == 1) {
     tt_row_times_slice(core, s.choice[0], s.row, s.row_next);
-    tt_rescale(s.row_next, core.columns);
+    tt_rescale(s.row_next, core.width);
     return;
   }
   int32_t next[TAB_TT_MAX_N];
@@ -219,7 +252,7 @@ void descend(TabTtSampler& s, const TtCore& core, int32_t nchild) {
     }
     if (members == 1) tt_rows_times_slice<1>(core, point, row, out);
     else tt_rows_times_slice<kBlock>(core, point, row, out);
-    for (int32_t b = 0; b < members; ++b) tt_rescale(out[b], core.columns);
+    for (int32_t b = 0; b < members; ++b) tt_rescale(out[b], core.width);
     first += members;
   }
 }
@@ -308,8 +341,7 @@ TabStatus tab_tt_sample(TabTtSampler* s, double alpha, int32_t count, uint64_t s
   const TabTt* tab = s->tab;
   const int32_t d = tab->d;
   if (count < 1 || count > s->capacity || !(alpha == alpha)) return kTabBad;
-  const bool greedy = alpha >= 1 - 1e-6;
-  const float beta = greedy ? 1.0f : static_cast<float>(1 / (1 - std::fmax(alpha, 0.0)));
+  const Power power(alpha);
   int32_t last_free = -1;
   for (int32_t k = 0; k < d; ++k)
     if (!s->fixed[k]) last_free = k;
@@ -346,13 +378,13 @@ TabStatus tab_tt_sample(TabTtSampler* s, double alpha, int32_t count, uint64_t s
     for (int32_t first = 0; first < ngroup; first += kBlock) {
       const int32_t members = ngroup - first < kBlock ? ngroup - first : kBlock;
       weigh(*s, core, W, first, members, block);
-      for (int32_t b = 0; b < members; ++b) block[b].prepare(beta, greedy);
+      for (int32_t b = 0; b < members; ++b) block[b].prepare(power);
       for (int32_t b = 0; b < members; ++b) {
         nchild = split(*s, block[b], first + b, k, seed, nchild);
         for (int32_t i = s->begin[first + b]; i < s->begin[first + b + 1]; ++i) {
           const int32_t sample = s->order[i], point = s->point[i];
           x[static_cast<int64_t>(sample) * d + k] = lo + point * step;
-          if (log_prob && !greedy) log_prob[sample] += std::log(static_cast<double>(block[b].p[point]) / block[b].total);
+          if (log_prob && !power.greedy) log_prob[sample] += std::log(static_cast<double>(block[b].p[point]) / block[b].total);
         }
       }
     }

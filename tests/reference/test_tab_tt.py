@@ -142,7 +142,7 @@ MASKS = {
 }
 
 
-@pytest.mark.parametrize("alpha", [0.0, 0.5, 0.9])
+@pytest.mark.parametrize("alpha", [0.0, 0.5, 0.6, 0.9])  # 1 / (1 - alpha): whole numbers, and 2.5
 @pytest.mark.parametrize("mask", MASKS)
 def test_conditional_probabilities(mask: str, alpha: float) -> None:
     table = random_train([6, 11, 9, 8, 5], [7, 20, 9, 4], seed=6, signed=False)

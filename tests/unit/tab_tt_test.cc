@@ -89,6 +89,28 @@ TEST(TabTt, ConditionalProbabilitiesByHand) {
   EXPECT_EQ(x[1], 1.0);
 }
 
+// p = 2, 2e-5, 1 of the three points of x: to the power of 10 and of 9.5, what is below 2^-126 has no probability at all.
+TEST(TabTt, PowersByHandAndWhatVanishesIsNeverDrawn) {
+  Small s;
+  s.core[8] = 1e-5f;
+  s.core[9] = 0;
+  s.core[16] = 0.5f;
+  constexpr int kCount = 4096;
+  Sampler t(s.table, kCount);
+  std::vector<double> x(2 * kCount), log_prob(kCount);
+  for (const double beta : {10.0, 9.5}) {
+    ASSERT_EQ(tab_tt_sample(&t.sampler, 1 - 1 / beta, kCount, 1, x.data(), log_prob.data()), kTabOk);
+    const double half = std::pow(0.5, beta), y = std::log(0.5);  // given x, both points of y are as likely
+    int seldom = 0;
+    for (int i = 0; i < kCount; ++i) {
+      ASSERT_NE(x[2 * i], 1.0);
+      seldom += x[2 * i] == 2.0;
+      EXPECT_NEAR(log_prob[i], y + std::log((x[2 * i] == 2.0 ? half : 1) / (1 + half)), 4e-5);  // (3 + power) 1e-6 of each power
+    }
+    EXPECT_NEAR(seldom, kCount * half, 4 * std::sqrt(kCount * half) + 1);
+  }
+}
+
 TEST(TabTt, CheckRefusesWhatContradictsItself) {
   EXPECT_EQ(Small().complaint(), "");
   for (int i = 0; i < 5; ++i) {

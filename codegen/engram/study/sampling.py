@@ -19,6 +19,7 @@ from engram.study.report import Report
 from engram.study.trains import SOLVED, Recipe, lowest, samples, solutions, table_of
 
 ALPHA = 0.9
+CALLS = 16  # single samples of ours between two readings of the clock
 SEEDS = (1, 2, 3)  # of the cross approximations that are compared
 RECIPE = Recipe(points=(40, 50), rank=16, enrich=16, sweeps=1, spread=True, starts=600)  # of the crosses
 BEST_OF = 12  # of our own seeds the best on VALIDATION tasks is kept, as in every study; all of that is timed
@@ -64,6 +65,11 @@ class Case:
 CASES = (Case(10, 50, 60), Case(7, 100, 10, 1.0), Case(7, 100, 50, 3.0), Case(70, 100, 10, 15.0), Case(70, 100, 50, 15.0))
 
 
+def calls_of(count: int) -> int:
+    """Calls of ours, `count` samples each, between two readings of the clock."""
+    return CALLS if count == 1 else 1
+
+
 class Sides:
     """One train on all sides: ours; PyTorch (None: not installed) as algorithm 6 is printed, and tuned; teneva at alpha = 0."""
 
@@ -80,17 +86,21 @@ class Sides:
         return float(np.abs(log_prob - self.worker.ask("log_probability", alpha=ALPHA, points=points)["log_probability"]).max())
 
     def times_us(self, count: int, rounds: int) -> dict[str, np.ndarray]:
-        """Processor times of drawing `count` samples, all sides in turn."""
+        """Processor times of drawing `count` samples, all sides in turn in short blocks: what slows the machine slows them all.
+
+        Reading the clock takes a tenth of our single sample, so it is read around CALLS of them, each a call with a seed of its
+        own, and a time is their mean.
+        """
         import teneva
 
-        many = max(4, 400 // count)
+        single = count == 1
         found: dict[str, list[np.ndarray]] = {}
-        for _ in range(rounds):
-            found.setdefault("ours", []).append(self.ours.time_us(ALPHA, count, many))
+        for block in range(rounds * (5 if single else 1)):
+            found.setdefault("ours", []).append(self.ours.time_us(ALPHA, count, 40 if single else 4, calls_of(count)))
             for name, tuned in (("pytorch", False), ("tuned", True)) if self.worker else ():
-                us = self.worker.ask("sample", alpha=ALPHA, count=count, tuned=tuned, repeats=max(2, many // 20))["us"]
+                us = self.worker.ask("sample", alpha=ALPHA, count=count, tuned=tuned, repeats=4 if single else 1)["us"]
                 found.setdefault(name, []).append(us)
-            if self.case.d < 70 and count != 100:
+            if self.case.d < 70 and count != 100 and block < 3:
                 clock = time.process_time()
                 teneva.sample(self.cores, m=count, seed=1)
                 found.setdefault("teneva", []).append(np.array([1e6 * (time.process_time() - clock)]))
@@ -107,7 +117,7 @@ def run(row: str, quick: bool) -> None:
         for case in CASES[:2] if quick else CASES:
             sides = Sides(case, worker)
             for count in (1, 100) if quick else (1, 100, 1000):
-                us = {name: float(np.median(values)) for name, values in sides.times_us(count, 2).items()}
+                us = {name: float(np.median(values)) for name, values in sides.times_us(count, 3).items()}
                 cells = f"d={case.d:<3} n={case.n:<4} r={case.r:<5}{count:>8}{1e-3 * us['ours']:>10.4f}"
                 for name, width in (("pytorch", 12), ("tuned", 10), ("teneva", 11)):
                     cells += f"{1e-3 * us[name]:>{width}.2f}{us[name] / us['ours']:>7.0f}" if name in us else " " * (width + 7)
@@ -157,7 +167,7 @@ def crosses(seeds: tuple[int, ...], tests: int) -> Iterator[Cross]:
     def success(cores: list[np.ndarray], tasks: np.ndarray) -> float:
         train = engine.TensorTrain(table_of(cost, cores), 10)
         start, _ = lowest(cost, samples(train, cost, tasks, ALPHA, 1))
-        return float(np.mean(cost.refine(start, recipe.evaluations)[1] <= SOLVED))
+        return float(np.mean(cost.refine(start, recipe.evaluations, SOLVED)[1] <= SOLVED))
 
     for seed in seeds:
         clock = time.process_time()
