@@ -71,7 +71,7 @@ inline void tt_pass(int32_t vectors, const float* row, int32_t rows, const void*
 // out_g = row_g M for G rows, in as few passes over the rows of M as registers allow, all of about the same number of vectors.
 template <int type, int G>
 inline void tt_rows_times(const float* const* row, int32_t rows, const void* data, int64_t at, int32_t width, float* const* out) {
-  constexpr int kMost = G == 1 ? 8 : 3;
+  constexpr int kMost = G == 1 ? 8 : G == 2 ? 7 : 3;
   alignas(64) float packed[G > 1 ? TAB_TT_MAX_R * G : 1];
   for (int32_t j = 0; G > 1 && j < rows; ++j)
     for (int g = 0; g < G; ++g) packed[j * G + g] = row[g][j];

@@ -251,6 +251,7 @@ void descend(TabTtSampler& s, const TtCore& core, int32_t nchild) {
       out[b] = s.row_next + static_cast<int64_t>(c) * TAB_TT_MAX_R;
     }
     if (members == 1) tt_rows_times_slice<1>(core, point, row, out);
+    else if (members == 2) tt_rows_times_slice<2>(core, point, row, out);
     else tt_rows_times_slice<kBlock>(core, point, row, out);
     for (int32_t b = 0; b < members; ++b) tt_rescale(out[b], core.width);
     first += members;

@@ -94,11 +94,12 @@ class Sides:
         import teneva
 
         single = count == 1
+        repeats = 12 if single else max(1, 400 // count)  # of the peers: the first of a block finds its numbers in no cache
         found: dict[str, list[np.ndarray]] = {}
-        for block in range(rounds * (5 if single else 1)):
+        for block in range(rounds * (3 if single else 1)):
             found.setdefault("ours", []).append(self.ours.time_us(ALPHA, count, 40 if single else 4, calls_of(count)))
             for name, tuned in (("pytorch", False), ("tuned", True)) if self.worker else ():
-                us = self.worker.ask("sample", alpha=ALPHA, count=count, tuned=tuned, repeats=4 if single else 1)["us"]
+                us = self.worker.ask("sample", alpha=ALPHA, count=count, tuned=tuned, repeats=repeats)["us"]
                 found.setdefault(name, []).append(us)
             if self.case.d < 70 and count != 100 and block < 3:
                 clock = time.process_time()
