@@ -20,6 +20,7 @@ struct TtCore {
 
   int64_t slice(int32_t i) const { return offset + static_cast<int64_t>(i) * rows * width; }
   int64_t size() const { return static_cast<int64_t>(n) * rows * width; }
+  const void* address(int32_t i) const { return static_cast<const char*>(data) + slice(i) * (type == kTabInt8 ? 1 : 4); }
 };
 inline TtCore tt_core(const TabTt* tab, int32_t k, int64_t offset) {
   const int32_t columns = tt_r(tab, k + 1);
@@ -44,13 +45,17 @@ inline TtPoint tt_point(const TabTt* tab, int32_t k, double x) {
 }
 
 // out_g[c ..] = sum_j row_g[j] M[j][c ..] for G rows, side by side (rows, G), and V vectors of columns; M (rows, width) begins at
-// number `at`.
+// number `at`. `ahead`, unless null, is a matrix as large that is wanted next: row j of it is asked for at row j, into the second cache.
 template <int type, int G, int V>
-inline void tt_product(const float* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out) {
+inline void tt_product(const float* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out,
+                       const void* ahead) {
+  const int32_t row_bytes = width * (type == kTabInt8 ? 1 : 4);
+  const char* next = static_cast<const char*>(ahead);
   TabLanes sum[G][V];
 #pragma GCC unroll 32
   for (int i = 0; i < G * V; ++i) sum[i / V][i % V] = TabLanes{};
   for (int32_t j = 0; j < rows; ++j) {
+    for (int32_t b = 0; next && b < row_bytes; b += 64) __builtin_prefetch(next + j * row_bytes + b, 0, 2);
     TabLanes m[V];
 #pragma GCC unroll 8
     for (int v = 0; v < V; ++v) m[v] = tab_load_as<type>(data, at + static_cast<int64_t>(j) * width + c + v * TAB_LANES);
@@ -63,14 +68,16 @@ inline void tt_product(const float* row, int32_t rows, const void* data, int64_t
 
 // The same for a number of vectors that is known when it runs: 1 .. V.
 template <int type, int G, int V>
-inline void tt_pass(int32_t vectors, const float* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out) {
-  if (vectors == V) return tt_product<type, G, V>(row, rows, data, at, width, c, out);
-  if constexpr (V > 1) tt_pass<type, G, V - 1>(vectors, row, rows, data, at, width, c, out);
+inline void tt_pass(int32_t vectors, const float* row, int32_t rows, const void* data, int64_t at, int32_t width, int32_t c, float* const* out,
+                    const void* ahead) {
+  if (vectors == V) return tt_product<type, G, V>(row, rows, data, at, width, c, out, ahead);
+  if constexpr (V > 1) tt_pass<type, G, V - 1>(vectors, row, rows, data, at, width, c, out, ahead);
 }
 
 // out_g = row_g M for G rows, in as few passes over the rows of M as registers allow, all of about the same number of vectors.
 template <int type, int G>
-inline void tt_rows_times(const float* const* row, int32_t rows, const void* data, int64_t at, int32_t width, float* const* out) {
+inline void tt_rows_times(const float* const* row, int32_t rows, const void* data, int64_t at, int32_t width, float* const* out,
+                          const void* ahead = nullptr) {
   constexpr int kMost = G == 1 ? 8 : G == 2 ? 7 : 3;
   alignas(64) float packed[G > 1 ? TAB_TT_MAX_R * G : 1];
   for (int32_t j = 0; G > 1 && j < rows; ++j)
@@ -79,7 +86,7 @@ inline void tt_rows_times(const float* const* row, int32_t rows, const void* dat
   int32_t left = width / TAB_LANES;
   for (int32_t passes = (left + kMost - 1) / kMost, c = 0; passes > 0; --passes) {
     const int32_t vectors = (left + passes - 1) / passes;
-    tt_pass<type, G, kMost>(vectors, side_by_side, rows, data, at, width, c, out);
+    tt_pass<type, G, kMost>(vectors, side_by_side, rows, data, at, width, c, out, c == 0 ? ahead : nullptr);
     left -= vectors;
     c += vectors * TAB_LANES;
   }
@@ -90,11 +97,12 @@ template <int type> inline float tt_number(const void* data, int64_t at) {
   else return static_cast<const float*>(data)[at];
 }
 
-// out_g (width) = row_g (rows) times slice i for G rows
-template <int G> inline void tt_rows_times_slice(const TtCore& core, int32_t i, const float* const* row, float* const* out) {
+// out_g (width) = row_g (rows) times slice i for G rows; `ahead`: null, or the address of the next slice
+template <int G>
+inline void tt_rows_times_slice(const TtCore& core, int32_t i, const float* const* row, float* const* out, const void* ahead = nullptr) {
   const auto times = [&](auto type) {
     const int64_t at = core.slice(i);
-    if (core.width > 1) return tt_rows_times<type, G>(row, core.rows, core.data, at, core.width, out);
+    if (core.width > 1) return tt_rows_times<type, G>(row, core.rows, core.data, at, core.width, out, ahead);
     for (int g = 0; g < G; ++g) {
       float sum = 0;
       for (int32_t j = 0; j < core.rows; ++j) sum += row[g][j] * tt_number<type>(core.data, at + j);

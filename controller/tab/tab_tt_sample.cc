@@ -224,7 +224,8 @@ int32_t split(TabTtSampler& s, const Choice& choice, int32_t g, int32_t k, uint6
   return nchild;
 }
 
-// row_next = row P^k[choice] for all new groups, those of the same choice together: each slice is read once.
+// row_next = row P^k[choice] for all new groups, those of the same choice together: each slice is read once, and asked for during the
+// product before.
 void descend(TabTtSampler& s, const TtCore& core, int32_t nchild) {
   if (nchild == 1) {
     tt_row_times_slice(core, s.choice[0], s.row, s.row_next);
@@ -250,9 +251,11 @@ void descend(TabTtSampler& s, const TtCore& core, int32_t nchild) {
       row[b] = s.row + static_cast<int64_t>(s.parent[c]) * TAB_TT_MAX_R;
       out[b] = s.row_next + static_cast<int64_t>(c) * TAB_TT_MAX_R;
     }
-    if (members == 1) tt_rows_times_slice<1>(core, point, row, out);
-    else if (members == 2) tt_rows_times_slice<2>(core, point, row, out);
-    else tt_rows_times_slice<kBlock>(core, point, row, out);
+    const int32_t following = first + members < nchild ? s.choice[s.alike[first + members]] : point;
+    const void* const ahead = following == point ? nullptr : core.address(following);
+    if (members == 1) tt_rows_times_slice<1>(core, point, row, out, ahead);
+    else if (members == 2) tt_rows_times_slice<2>(core, point, row, out, ahead);
+    else tt_rows_times_slice<kBlock>(core, point, row, out, ahead);
     for (int32_t b = 0; b < members; ++b) tt_rescale(out[b], core.width);
     first += members;
   }
