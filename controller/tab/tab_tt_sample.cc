@@ -35,7 +35,8 @@ TabLanes power_of(const TabLanes& x, float power) {
 }
 
 // x^power for a whole number > 0, by repeated squaring: relative error below power 2^-24. No step is smaller than the result.
-TabLanes power_of(TabLanes x, int32_t power) {
+TabLanes power_of(const TabLanes& base, int32_t power) {
+  TabLanes x = base;
   for (; !(power & 1); power >>= 1) x *= x;
   TabLanes y = x;
   while (power >>= 1) {
