@@ -88,6 +88,20 @@ bool touches(const LeggedPlant& plant, int pole) {
   return false;
 }
 
+// From the sphere of the arm that is nearest to the pole to it [m].
+double clearance(const LeggedPlant& plant) {
+  double least = HUGE_VAL;
+  for (int g = 0; g < plant.model()->ngeom; ++g) {
+    const char* const name = mj_id2name(plant.model(), mjOBJ_GEOM, g);
+    if (name == nullptr || std::strncmp(name, "sphere_", 7) != 0) continue;
+    const double* const p = plant.data()->geom_xpos + 3 * g;
+    engram::Vec3<double> gradient;
+    const double to_centre = engram::TalosPole::Field::distance(0, engram::Vec3<double>(p[0], p[1], p[2]), gradient);
+    least = std::min(least, to_centre - plant.model()->geom_size[3 * g]);
+  }
+  return least;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -179,7 +193,7 @@ int main(int argc, char** argv) {
     if (guided && ready && !fallen) led = guide->begin(plant.q.data(), m.to, seed + static_cast<uint64_t>(n)) == RrtResult::kFound && led;
     const int64_t start = plant.utime;
     std::vector<double> rows;
-    double worst = 0.0, over = 0.0;
+    double worst = 0.0, over = 0.0, nearest = HUGE_VAL, nearest_at = 0.0;  // m, rad, m, s
     int remembered = 0, asked = 0, worse = 0;  // cycles that the memory has won; answered; won though its merit was above the shifted plan's
     while (ready && plant.utime < start + static_cast<int64_t>(1e6 * kAlone) && !fallen) {
       const double t = 1e-6 * static_cast<double>(plant.utime - start);
@@ -212,6 +226,7 @@ int main(int argc, char** argv) {
         if (clocked != nullptr) std::fwrite(row, sizeof row, 1, clocked);
       }
       touched = touched || touches(plant, pole);
+      if (const double now = clearance(plant); now < nearest) nearest = now, nearest_at = t;
       over = std::max(over, excess(plant));
       if (t > kAlone - kRest) worst = std::max(worst, distance(hand, m.to));
     }
@@ -219,8 +234,8 @@ int main(int argc, char** argv) {
     if (success && log != nullptr) std::fwrite(rows.data(), sizeof(double), rows.size(), log);
     successes += success ? 1 : 0;
     ++done;
-    std::printf("motion %d side %d speed %.2f ready %d success %d led %d error_m %.4f touched %d over_mrad %.2f fallen %d refused %d remembered %d asked %d worse %d hand %.3f %.3f %.3f\n", n,
-                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, led, worst, touched, 1e3 * over, fallen, refused, remembered, asked, worse, hand[0], hand[1], hand[2]);
+    std::printf("motion %d side %d speed %.2f ready %d success %d led %d error_m %.4f touched %d nearest_mm %.1f at_s %.2f over_mrad %.2f fallen %d refused %d remembered %d asked %d worse %d hand %.3f %.3f %.3f\n", n,
+                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, led, worst, touched, 1e3 * nearest, nearest_at, 1e3 * over, fallen, refused, remembered, asked, worse, hand[0], hand[1], hand[2]);
     std::fflush(stdout);
   }
   if (log != nullptr) std::fclose(log);

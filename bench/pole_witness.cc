@@ -1,5 +1,5 @@
 // The cost of a trajectory (xs, us) as it is rolled out without gaps, with the gains of a sweep at it, as the fast side would execute it.
-// Apart from the merit by which the controller chooses (loop_merit.h, loop_solve.h):
+// Apart from the rollout by which the controller chooses (loop_rolled.h):
 //   J = sum_k l_k(x_k, u_k) + l_N(x_N),   u_k = us_k - K_k (x_k (-) xs_k),   x_{k+1} = f(x_k, u_k),   x_0 as expected
 // Without gains both trajectories diverge within the horizon, and tell nothing.
 #include "bench/pole_witness.h"
@@ -28,6 +28,7 @@ class WatchedPlanner : public RecedingPlanner<Model> {
   WatchedPlanner(const engram_options& options, Fast& fast) : RecedingPlanner<Model>(options, fast), shifted_(options) {}
 
   engram_status prepare(int64_t utime) {
+    const double reg = this->Core::solve_.reg();  // with which the shifted plan is swept
     const engram_status status = RecedingPlanner<Model>::prepare(utime);
     const engram_cycle& c = this->Core::cycle_;
     if (c.nguess < 2) return status;
@@ -38,7 +39,7 @@ class WatchedPlanner : public RecedingPlanner<Model> {
     shifted_.horizon = taken_over.horizon;
     shifted_.plan.n = N;
     std::memcpy(shifted_.plan.utime, taken_over.plan.utime, sizeof shifted_.plan.utime);
-    shifted_.start(seed_.x, seed_.u, taken_over.reg());
+    shifted_.start(seed_.x, seed_.u, reg);
     const double shifted = shifted_.ready() ? rolled(shifted_) : HUGE_VAL, taken = rolled(taken_over);
     if (!(taken <= shifted)) {
       ++witness.above;

@@ -229,7 +229,7 @@ typedef struct engram_cycle {
   int32_t iterations;                     // FDDP iterations spent
   int32_t nguess;                         // used entries of the next two
   engram_candidate guess[ENGRAM_GUESSES_MAX];
-  double merit[ENGRAM_GUESSES_MAX];       // cost + weight * L1 norm of the gaps
+  double merit[ENGRAM_GUESSES_MAX];       // cost + weight * L1 norm of the gaps; Talos at the pole: cost once these are rolled out
   double cost;                            // of the plan
   double gap;                             // L1 norm of its gaps
   double clearance;                       // m, smallest distance between a collision sphere and an obstacle along the plan

@@ -1,7 +1,8 @@
 // The memory of reaching around a pole: how the arm went on, in runs of this controller, from where it is now to such a target.
 //
-//   query   features (where the hand is, how it moves, where it shall go) -> k-NN -> PCA -> paths of torso and arm over the horizon
-//   warp    the path begins at the measured posture: q(t) = q_m(t) + (q_0 - q_m(0)) (1 - t / kFade)^2
+//   query   features (where hand and elbow are, how the hand moves, where it shall go) -> k-NN -> PCA -> paths of torso and arm over the horizon
+//   warp    the path begins at the measured posture and velocity: q(t) = q_m(t) + (e + (e' + 2 e / kFade) t) (1 - t / kFade)^2,
+//           e = q_0 - q_m(0), e' its rate
 //   guess   all else (legs, base, the other arm) as in the shifted plan; torques by inverse dynamics on both feet
 #ifndef CONTROLLER_LOOP_LOOP_POLE_MEMORY_H_
 #define CONTROLLER_LOOP_LOOP_POLE_MEMORY_H_
@@ -19,10 +20,10 @@ struct PoleTables {
   const TabPca* path;
 };
 
-inline constexpr int kPoleFeatures = 9;    // p_WH [m], v_WH [m/s], p_WT [m]; world axes
+inline constexpr int kPoleFeatures = 12;   // p_WH, p_WE [m], v_WH [m/s], p_WT [m]: hand, elbow, target; world axes
 inline constexpr int kPoleMaxPath = 512;   // numbers of a path
 
-// C: a configuration (loop_talos_pole.h) with `moved[nmoved]`, the driven dofs of the path, and hand(x, p, v).
+// C: a configuration (loop_talos_pole.h) with `moved[nmoved]`, the driven dofs of the path, hand(x, p) and arm(x, p_WH, p_WE, v_WH).
 template <class C, class P, const PoleTables& tables> class PoleMemory {
  public:
   static constexpr bool kRemembers = true, kContinues = false;
@@ -39,7 +40,7 @@ template <class C, class P, const PoleTables& tables> class PoleMemory {
   static uint64_t table_digest() { return (tables.knn->head.digest ^ tables.path->head.digest) * 0x100000001b3; }
 
   // The hand is where it shall be.
-  template <class Target> static bool needless(const Target& target, const double* x0) {
+  template <class Target> static bool arrived(const Target& target, const double* x0) {
     using Task = typename C::Task;
     double p[3], away2 = 0.0;
     C::hand(x0, p);
@@ -50,8 +51,8 @@ template <class C, class P, const PoleTables& tables> class PoleMemory {
   template <class Target, int N> bool guess(const Target& target, int64_t seq, const Plan<P, N>& shifted, Seed<P, N>& seed) {
     const double* const x0 = shifted.s.x[0];
     double feature[kPoleFeatures];
-    C::hand(x0, feature, feature + 3);
-    for (int i = 0; i < 3; ++i) feature[6 + i] = target.hand[i];
+    C::arm(x0, feature, feature + 3, feature + 6);
+    for (int i = 0; i < 3; ++i) feature[9 + i] = target.hand[i];
     int32_t index[kWays];
     float distance2[kWays];
     tab_knn_query(tables.knn, feature, kWays, index, distance2);
@@ -60,14 +61,17 @@ template <class C, class P, const PoleTables& tables> class PoleMemory {
     tab_pca_decode(tables.path, tab_knn_value(tables.knn, index[way]), path_);
 
     std::memcpy(seed.x, shifted.s.x, sizeof seed.x);
-    double rest[nmoved];
-    for (int j = 0; j < nmoved; ++j) rest[j] = x0[joint(j)] - static_cast<double>(path_[j]);
+    double e[nmoved], slope[nmoved];
+    for (int j = 0; j < nmoved; ++j) {
+      e[j] = x0[joint(j)] - static_cast<double>(path_[j]);
+      slope[j] = x0[velocity(j)] - (at(j, kKnot) - at(j, 0.0)) / kKnot + 2.0 / kFade * e[j];
+    }
     for (int k = 0; k < N; ++k) {
       const double dt = shifted.dt(k), t = 1e-6 * static_cast<double>(shifted.utime[k + 1] - shifted.utime[0]);
       const double fade = std::fmax(0.0, 1.0 - t / kFade);
       for (int j = 0; j < nmoved; ++j) {
         const int q = joint(j), v = velocity(j);
-        seed.x[k + 1][q] = at(j, t) + rest[j] * fade * fade;
+        seed.x[k + 1][q] = at(j, t) + (e[j] + slope[j] * t) * fade * fade;
         seed.x[k + 1][v] = (seed.x[k + 1][q] - seed.x[k][q]) / dt;
       }
       double a[nv];

@@ -44,7 +44,7 @@ template <class M> class RecedingPlanner : public PlannerCore<M, RecedingPlanner
       Core::solve_, Core::task_, Core::trial_, Core::watch_;
 
   bool iterate(const Plan<P, N>& before, bool fresh, Deadline& deadline);
-  bool challenge(Deadline& deadline);
+  void challenge(Deadline& deadline);
 
   M model_;
   int64_t origin_ = 0;  // us, whole knots end at origin_ + m kStepUs
@@ -81,8 +81,8 @@ template <class M> bool RecedingPlanner<M>::iterate(const Plan<P, N>& before, bo
   return solve_.improve(iterations - 1, deadline, [] {}) && solve_.ready();
 }
 
-// What the memory proposes takes the place of the shifted plan if it costs less after iterations of its own. False if the solver failed.
-template <class M> bool RecedingPlanner<M>::challenge(Deadline& deadline) {
+// What the memory proposes takes the place of the shifted plan if it costs less after iterations of its own.
+template <class M> void RecedingPlanner<M>::challenge(Deadline& deadline) {
   const double begin = deadline.now();
   if (jumped_) rival_.forget();
   const bool asked = rival_.ask(task_.target, seq_, solve_, [&](int k, const double* x, double* u, double* x_next) {
@@ -91,15 +91,16 @@ template <class M> bool RecedingPlanner<M>::challenge(Deadline& deadline) {
   const double answered = deadline.now();
   cycle_.asked_us[ENGRAM_CANDIDATE_KNN] = answered - begin;
   cycle_.query_us += answered - begin;
-  if (!asked) return true;
-  rival_.improve(solve_, deadline);
+  if (!asked) return;
+  const bool better = rival_.better(solve_, deadline);
   cycle_.candidates_us = deadline.now() - answered;
   cycle_.guess[1] = ENGRAM_CANDIDATE_KNN;
-  cycle_.merit[1] = rival_.merit();
+  cycle_.merit[0] = rival_.cost_of_shifted();
+  cycle_.merit[1] = rival_.cost();
   cycle_.nguess = 2;
-  if (!(rival_.merit() < solve_.merit() && rival_.cheaper(solve_))) return true;
+  if (!better) return;
   cycle_.winner = ENGRAM_CANDIDATE_KNN;
-  return rival_.take_over(solve_);
+  rival_.take_over(solve_);
 }
 
 template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
@@ -132,13 +133,11 @@ template <class M> engram_status RecedingPlanner<M>::prepare(int64_t utime) {
   cycle_.winner = cycle_.guess[0] = cold ? ENGRAM_CANDIDATE_COLD : ENGRAM_CANDIDATE_SHIFTED;
   if (iterate(postponed ? solve_.plan : plan_, cold, deadline)) {
     if (cycle_.nguess == 1) cycle_.merit[0] = solve_.merit();
-    bool ready = true;
     if constexpr (M::Memory::kRemembers) {
-      if (options_.memory == ENGRAM_MODE_MEMORY && task_.known && !fresh) ready = challenge(deadline);
+      if (options_.memory == ENGRAM_MODE_MEMORY && task_.known && !fresh) challenge(deadline);
     }
-    if (ready) trial_ = Trial::kReady;
+    trial_ = Trial::kReady;
     if (deadline.late()) ending_ = ENGRAM_DEADLINE;
-    if (!ready) ending_ = solve_.failure();
   } else {
     ending_ = solve_.failure();
   }

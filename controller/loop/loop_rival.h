@@ -2,18 +2,20 @@
 //
 // A plan that has come to rest before an obstacle stays there: its shift is a local minimum, and an iteration leaves it where it is. A rival
 // starts elsewhere. It has M::Memory::kIterations iterations of each tick for M::Memory::kPatience ticks, its trajectory shifted in between
-// as the plan's is; then the memory is asked anew. It takes the plan's place as soon as its merit (cost + kMeritWeight * gaps) is below the
-// shifted plan's and it costs no more rolled out (loop_rolled.h), and never otherwise. No switch_gain: waiting for a tenth less let a stuck
-// arm push on into what it was stuck at.
+// as the plan's is; then the memory is asked anew. It takes the plan's place as soon as it costs less than the shifted plan, both rolled out
+// without gaps and with the gains of a sweep at themselves (loop_rolled.h), and never otherwise: by its merit a plan whose gaps are open
+// looks good that would swing the arm into what it is stuck at. No switch_gain: waiting for a tenth less let it do so.
+// Where the robot has arrived the memory is asked at each tick, and its answer is iterated on only if as it stands it has the lower merit.
 // A memory has
 //
 //   static constexpr bool kRemembers;  static constexpr int kIterations, kPatience;
-//   static bool needless(target, x0)   true where the shifted plan alone does: nothing is asked or iterated
+//   static bool arrived(target, x0)   true where the shifted plan has nothing left to do
 //   bool guess(target, seq, const Plan& shifted, Seed&)   a trajectory on the shifted plan's knot times and from its state; false: none.
 //                                                         seq counts ticks: those who know several ways offer them in turn
 #ifndef CONTROLLER_LOOP_LOOP_RIVAL_H_
 #define CONTROLLER_LOOP_LOOP_RIVAL_H_
 
+#include "controller/loop/loop_merit.h"
 #include "controller/loop/loop_rolled.h"
 #include "controller/loop/loop_solve.h"
 
@@ -32,47 +34,62 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
 
   explicit Rival(const engram_options& options) : solve_(options) {}
 
-  // False if there is none, or if none is needed. extend(k, x, u, x_next): how a trajectory goes on beyond its end.
+  // False if there is none.
   template <class Extend> bool ask(const typename M::Target& target, int64_t seq, const Solve<M>& shifted, Extend extend) {
-    if (M::Memory::needless(target, shifted.horizon.x0)) return age_ = 0, false;
-    if (age_ >= M::Memory::kPatience) age_ = 0;
+    arrived_ = M::Memory::arrived(target, shifted.horizon.x0);
+    if (arrived_ || age_ >= M::Memory::kPatience) age_ = 0;
     reg_ = age_ > 0 ? solve_.reg() : 0.0;
     if (age_ > 0) resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, seed_, extend);
     else if (!memory_.guess(target, seq, shifted.plan, seed_)) return false;
     return all_finite(seed_.x[0], (N + 1) * M::P::nx) && all_finite(seed_.u[0], N * M::P::nu) ? true : (age_ = 0, false);
   }
-  // Iterates on the horizon of the shifted plan.
-  void improve(const Solve<M>& shifted, Deadline& deadline) {
+  // Iterates on the horizon of the shifted plan. True if it is to take that one's place.
+  bool better(const Solve<M>& shifted, Deadline& deadline) {
+    cost_[0] = HUGE_VAL;
+    cost_[1] = shifted.merit();
+    if (arrived_) {
+      Candidate<typename M::P> answer = {ENGRAM_CANDIDATE_KNN, seed_.x, seed_.u, 0.0, 0.0, 0.0};
+      loop_merit<typename M::P, N>(shifted.horizon, &answer, 1);
+      if (!(answer.merit < cost_[1])) {
+        cost_[0] = answer.merit;
+        return false;
+      }
+    }
     solve_.horizon = shifted.horizon;
     solve_.plan.n = N;
     std::memcpy(solve_.plan.utime, shifted.plan.utime, sizeof(solve_.plan.utime));
     solve_.clear();
     solve_.start(seed_.x, seed_.u, reg_);
-    sound_ = solve_.improve(M::Memory::kIterations, deadline, [] {}) && std::isfinite(solve_.plan.s.cost);
-    age_ = sound_ ? age_ + 1 : 0;
+    ++age_;
+    if (solve_.improve(M::Memory::kIterations, deadline, [] {})) {
+      // By the gains of its last iteration most have no chance; those of a sweep decide.
+      if (!cheaper(shifted)) return false;
+      if (solve_.ready()) return cheaper(shifted);
+    }
+    age_ = 0;
+    return false;
   }
   void forget() { age_ = 0; }
-  double merit() const { return sound_ ? solve_.merit() : HUGE_VAL; }
-  const FddpStats& stats() const { return solve_.stats; }
-  // Rolled out without gaps it costs no more than the shifted plan; one that does not stay finite costs more than any that does.
-  bool cheaper(const Solve<M>& shifted) const {
-    double cost[2];
-    loop_rolled(shifted.horizon, solve_.plan.s, shifted.plan.s, cost);
-    return std::isfinite(cost[0]) && !(cost[0] > cost[1]);
-  }
-  // The rival becomes the plan, swept once more. False if that failed.
-  bool take_over(Solve<M>& shifted) {
+  double cost() const { return cost_[0]; }
+  double cost_of_shifted() const { return cost_[1]; }
+  // What is better, as it was swept, becomes the plan.
+  void take_over(Solve<M>& shifted) {
     age_ = 0;
-    shifted.start(solve_.plan.s.x, solve_.plan.s.u, solve_.reg());
-    return shifted.ready();
+    shifted.become(solve_);
   }
 
  private:
+  bool cheaper(const Solve<M>& shifted) {
+    loop_rolled(shifted.horizon, solve_.plan.s, shifted.plan.s, cost_);
+    if (!std::isfinite(cost_[0])) cost_[0] = HUGE_VAL;
+    return std::isfinite(cost_[0]) && !(cost_[0] >= cost_[1]);
+  }
+
   Seed<typename M::P, N> seed_;
   Solve<M> solve_;
-  bool sound_ = false;
-  int age_ = 0;       // ticks that the trajectory has been iterated in
-  double reg_ = 0.0;
+  bool arrived_ = false;
+  int age_ = 0;  // ticks that the trajectory has been iterated in
+  double reg_ = 0.0, cost_[2] = {HUGE_VAL, HUGE_VAL};  // of the rival, of the shifted plan
   typename M::Memory memory_;
 };
 

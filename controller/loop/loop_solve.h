@@ -71,6 +71,13 @@ template <class M> class Solve {
     failure_ = ENGRAM_ITERATING;
   }
 
+  // What `other` is on the same horizon: trajectory, direction, gains. The iterations counted stay its own.
+  void become(const Solve& other) {
+    const FddpStats own = stats;
+    *this = other;
+    stats = own;
+  }
+
   // Up to n whole iterations; `each()` is called after every one. False if the solver failed: failure() says how.
   template <class F> bool improve(int n, Deadline& deadline, F each) {
     for (int i = 0; i < n && !converged() && !deadline.late(); ++i) {

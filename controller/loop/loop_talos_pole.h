@@ -38,27 +38,34 @@ struct TalosPole : TalosBody<tasks::TalosPole, 50> {
     k.obstacle_margin = Task::reach_margin;
     k.limit_margin_q = Task::reach_limit_margin;
   }
-  // Where the hand is [m], and how it moves [m/s]: world axes.
+  // Where the hand is [m]: world axes.
   static void hand(const double* x, double (&p)[3]) {
-    double v[3];
-    hand(x, p, v);
-  }
-  static void hand(const double* x, double* p, double* v) {
     RbdData<Robot, double> d;
+    rbd_kinematics<Robot>(x, d);
     Mat3<double> R_WF;
     Vec3<double> at;
+    rbd_frame_placement<Robot>(d, kHand, R_WF, at);
+    for (int i = 0; i < 3; ++i) p[i] = at[i];
+  }
+  // Where hand and elbow are [m], and how the hand moves [m/s]: world axes.
+  static void arm(const double* x, double* p_WH, double* p_WE, double* v_WH) {
+    RbdData<Robot, double> d;
     rbd_kinematics<Robot>(x, d);
     rbd_velocity<Robot>(x + Robot::nq, d);
+    Mat3<double> R_WF;
+    Vec3<double> at;
     rbd_frame_placement<Robot>(d, kHand, R_WF, at);
     const Vec3<double> moves = rbd_point_velocity<Robot>(d, Robot::frame_joint[kHand], at);
     for (int i = 0; i < 3; ++i) {
-      p[i] = at[i];
-      v[i] = moves[i];
+      p_WH[i] = at[i];
+      p_WE[i] = d.p_WJ[1 + moved[kElbow]][i];
+      v_WH[i] = moves[i];
     }
   }
 
   // What the memory moves: driven dofs of the torso and of the right arm.
   static constexpr int nmoved = 9, moved[nmoved] = {12, 13, 22, 23, 24, 25, 26, 27, 28};
+  static constexpr int kElbow = 5;  // of them
 };
 
 // The same with a memory.

@@ -1,7 +1,7 @@
 """The memory of reaching around a pole: paths of torso and arm, cut from guided runs (docs/pole.md).
 
-Every `EVERY` s of a run that arrived is a sample: where the hand was, how it moved and where it was going -> how the joints
-went on over the horizon. Mirrors controller/loop/loop_pole_memory.h.
+Every `EVERY` s of a run that arrived is a sample: where hand and elbow were, how the hand moved and where it was going ->
+how the joints went on over the horizon. Mirrors controller/loop/loop_pole_memory.h.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from engram.robots.tree import q_to_pin
 from engram.tasks.motion import MotionSpec
 
 MOVED = np.array([12, 13, 22, 23, 24, 25, 26, 27, 28])  # driven dofs: torso, right arm (TalosPole::moved)
-HAND = "right_gripper"
+HAND, ELBOW = "right_gripper", "arm_right_4_joint"
 PERIOD = 0.01  # s, between rows of a recording
 EVERY = 0.1  # s, between samples of a run
 UNTIL = 1.8  # s, the last sample of a run: later the hand has arrived
 COMPONENTS = 16
-SCALE = np.array([1.0, 1.0, 1.0, 0.15, 0.15, 0.15, 1.0, 1.0, 0.6])  # 1/m, s/m, 1/m: height of the target matters less
+SCALE = np.repeat([1.0, 0.7, 0.15, 1.0, 0.6], [3, 3, 3, 2, 1])  # 1/m, 1/m, s/m, 1/m: height of the target matters less
 HELD_OUT = 10  # every tenth run
 AXES = "xyz"
 
@@ -33,7 +33,7 @@ AXES = "xyz"
 class Samples:
     """n samples of `runs` runs."""
 
-    feature: np.ndarray  # (n, 9) hand [m], its velocity [m/s], target [m]: world axes
+    feature: np.ndarray  # (n, 12) hand, elbow [m], velocity of the hand [m/s], target [m]: world axes
     path: np.ndarray  # (n, knots + 1, 9) joint angles [rad]
     run: np.ndarray  # (n)
 
@@ -56,7 +56,7 @@ def cut(spec: MotionSpec, runs: list[np.ndarray]) -> tuple[Samples, int]:
     features, paths, labels, lost = [], [], [], 0
     for label, run in enumerate(runs):
         q = run[:, 2 : 2 + tree.nq]
-        p = np.array([_hand(spec, row) for row in q])
+        p, elbow = np.swapaxes([_arm(spec, row) for row in q], 0, 1)
         if np.linalg.norm(p[-1] - run[-1, -3:]) > radius:
             lost += 1
             continue
@@ -65,7 +65,7 @@ def cut(spec: MotionSpec, runs: list[np.ndarray]) -> tuple[Samples, int]:
         for t in np.arange(0.0, UNTIL, EVERY):
             i = round(t / PERIOD)
             ahead = np.minimum(i + stride * np.arange(spec.knots + 1), len(run) - 1)
-            features.append(np.concatenate([p[i], v[i], run[i, -3:]]))
+            features.append(np.concatenate([p[i], elbow[i], v[i], run[i, -3:]]))
             paths.append(joints[ahead])
             labels.append(label)
     if not features:
@@ -73,13 +73,14 @@ def cut(spec: MotionSpec, runs: list[np.ndarray]) -> tuple[Samples, int]:
     return Samples(np.array(features), np.array(paths), np.array(labels)), lost
 
 
-def _hand(spec: MotionSpec, q: np.ndarray) -> np.ndarray:
-    """Position of the hand (m, world)."""
+def _arm(spec: MotionSpec, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Positions of hand and elbow (m, world)."""
     tree, f = spec.robot, spec.robot.frame_name.index(HAND)
     data = tree.model.createData()
     pin.forwardKinematics(tree.model, data, q_to_pin(tree, q))
     joint = int(tree.frame_joint[f])
-    return data.oMi[joint + 1].act(tree.R_turn[joint] @ tree.p_JF[f])
+    hand = data.oMi[joint + 1].act(tree.R_turn[joint] @ tree.p_JF[f])
+    return hand, data.oMi[tree.model.getJointId(ELBOW)].translation.copy()
 
 
 def fit(spec: MotionSpec, samples: Samples, folder: Path, provenance: str) -> dict:
@@ -94,7 +95,11 @@ def fit(spec: MotionSpec, samples: Samples, folder: Path, provenance: str) -> di
     near = _nearest(samples.feature[held], samples.feature[~held])
     other = np.abs(flat[~held][near] - flat[held]).max(axis=1)
     n = int(held.sum())
-    inputs = [(f"{name}_{axis}", unit_) for name, unit_ in (("p_WH", "m"), ("v_WH", "m/s"), ("p_WT", "m")) for axis in AXES]
+    inputs = [
+        (f"{name}_{axis}", unit_)
+        for name, unit_ in (("p_WH", "m"), ("p_WE", "m"), ("v_WH", "m/s"), ("p_WT", "m"))
+        for axis in AXES
+    ]
     lo, hi = samples.feature.min(axis=0), samples.feature.max(axis=0)
     knn = Knn(
         inputs=inputs,
