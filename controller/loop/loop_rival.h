@@ -1,10 +1,10 @@
-// A rival to the shifted plan: what a memory proposes for the horizon as it is posed, improved on its own, and judged by its merit.
+// A rival to the shifted plan: what a memory proposes for the horizon as it is posed, improved on its own, and judged by what it costs rolled out.
 //
 // A plan that has come to rest before an obstacle stays there: its shift is a local minimum, and an iteration leaves it where it is. A rival
 // starts elsewhere. It has M::Memory::kIterations iterations of each tick for M::Memory::kPatience ticks, its trajectory shifted in between
-// as the plan's is; then the memory is asked anew. It takes the plan's place as soon as it costs less than the shifted plan, both rolled out
-// without gaps and with the gains of a sweep at themselves (loop_rolled.h), and never otherwise: by its merit a plan whose gaps are open
-// looks good that would swing the arm into what it is stuck at. No switch_gain: waiting for a tenth less let it do so.
+// as the plan's is; then the memory is asked anew. It takes the plan's place if, swept at the beginning of a tick, it costs less than the
+// shifted plan, both rolled out without gaps and with the gains of a sweep at themselves (loop_rolled.h), and never otherwise: by its merit a
+// plan whose gaps are open looks good that would swing the arm into what it is stuck at. No switch_gain: waiting for a tenth less let it do so.
 // Where the robot has arrived the memory is asked at each tick, and its answer is iterated on only if as it stands it has the lower merit.
 // A memory has
 //
@@ -37,13 +37,13 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
   // False if there is none.
   template <class Extend> bool ask(const typename M::Target& target, int64_t seq, const Solve<M>& shifted, Extend extend) {
     arrived_ = M::Memory::arrived(target, shifted.horizon.x0);
-    if (arrived_ || age_ >= M::Memory::kPatience) age_ = 0;
+    if (arrived_) age_ = 0;
     reg_ = age_ > 0 ? solve_.reg() : 0.0;
     if (age_ > 0) resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, seed_, extend);
     else if (!memory_.guess(target, seq, shifted.plan, seed_)) return false;
     return all_finite(seed_.x[0], (N + 1) * M::P::nx) && all_finite(seed_.u[0], N * M::P::nu) ? true : (age_ = 0, false);
   }
-  // Iterates on the horizon of the shifted plan. True if it is to take that one's place.
+  // Sweeps it on the horizon of the shifted plan. True if it is to take that one's place; if not, it is iterated on for the next tick.
   bool better(const Solve<M>& shifted, Deadline& deadline) {
     cost_[0] = HUGE_VAL;
     cost_[1] = shifted.merit();
@@ -60,11 +60,9 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
     std::memcpy(solve_.plan.utime, shifted.plan.utime, sizeof(solve_.plan.utime));
     solve_.clear();
     solve_.start(seed_.x, seed_.u, reg_);
-    ++age_;
-    if (solve_.improve(M::Memory::kIterations, deadline, [] {})) {
-      // By the gains of its last iteration most have no chance; those of a sweep decide.
-      if (!cheaper(shifted)) return false;
-      if (solve_.ready()) return cheaper(shifted);
+    if (solve_.ready()) {
+      if (cheaper(shifted)) return true;
+      if (age_++ < M::Memory::kPatience && solve_.improve(M::Memory::kIterations, deadline, [] {}, true)) return false;
     }
     age_ = 0;
     return false;
@@ -72,7 +70,7 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
   void forget() { age_ = 0; }
   double cost() const { return cost_[0]; }
   double cost_of_shifted() const { return cost_[1]; }
-  // What is better, as it was swept, becomes the plan.
+  // What is better becomes the plan, as it was swept.
   void take_over(Solve<M>& shifted) {
     age_ = 0;
     shifted.become(solve_);

@@ -78,11 +78,13 @@ template <class M> class Solve {
     stats = own;
   }
 
-  // Up to n whole iterations; `each()` is called after every one. False if the solver failed: failure() says how.
-  template <class F> bool improve(int n, Deadline& deadline, F each) {
+  // Up to n whole iterations, the first one from a sweep that is done already if `swept`; `each()` is called after every one. False if the
+  // solver failed: failure() says how.
+  template <class F> bool improve(int n, Deadline& deadline, F each, bool swept = false) {
     for (int i = 0; i < n && !converged() && !deadline.late(); ++i) {
       const double begin = deadline.now();
-      if (!ready()) return false;
+      if (!swept && !ready()) return false;
+      swept = false;
       relinearize_ = step();
       if (!relinearize_) {  // the same direction would fail again: only more regularization can help
         work_.reg = increased(work_.reg, opts_);
