@@ -2,7 +2,7 @@
 //
 // A plan that has come to rest before an obstacle stays there: its shift is a local minimum, and an iteration leaves it where it is. A rival
 // starts elsewhere. It has M::Memory::kIterations iterations of each tick for M::Memory::kPatience ticks, its trajectory shifted in between
-// as the plan's is; then the memory is asked anew. It takes the plan's place if, swept at the beginning of a tick, it costs less than the
+// as the plan's is; then the memory is asked anew. It takes the plan's place if at the last sweep of a tick it costs less than the
 // shifted plan, both rolled out without gaps and with the gains of a sweep at themselves (loop_rolled.h), and never otherwise: by its merit a
 // plan whose gaps are open looks good that would swing the arm into what it is stuck at. No switch_gain: waiting for a tenth less let it do so.
 // Where the robot has arrived the memory is asked at each tick, and its answer is iterated on only if as it stands it has the lower merit.
@@ -37,13 +37,13 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
   // False if there is none.
   template <class Extend> bool ask(const typename M::Target& target, int64_t seq, const Solve<M>& shifted, Extend extend) {
     arrived_ = M::Memory::arrived(target, shifted.horizon.x0);
-    if (arrived_) age_ = 0;
+    if (arrived_ || age_ >= M::Memory::kPatience) age_ = 0;
     reg_ = age_ > 0 ? solve_.reg() : 0.0;
     if (age_ > 0) resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, seed_, extend);
     else if (!memory_.guess(target, seq, shifted.plan, seed_)) return false;
     return all_finite(seed_.x[0], (N + 1) * M::P::nx) && all_finite(seed_.u[0], N * M::P::nu) ? true : (age_ = 0, false);
   }
-  // Sweeps it on the horizon of the shifted plan. True if it is to take that one's place; if not, it is iterated on for the next tick.
+  // Iterates on the horizon of the shifted plan, and judges at the sweep of the last iteration. True if it is to take that one's place.
   bool better(const Solve<M>& shifted, Deadline& deadline) {
     cost_[0] = HUGE_VAL;
     cost_[1] = shifted.merit();
@@ -60,9 +60,10 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
     std::memcpy(solve_.plan.utime, shifted.plan.utime, sizeof(solve_.plan.utime));
     solve_.clear();
     solve_.start(seed_.x, seed_.u, reg_);
-    if (solve_.ready()) {
+    ++age_;
+    if (solve_.improve(M::Memory::kIterations - 1, deadline, [] {}) && solve_.ready()) {
       if (cheaper(shifted)) return true;
-      if (age_++ < M::Memory::kPatience && solve_.improve(M::Memory::kIterations, deadline, [] {}, true)) return false;
+      if (solve_.improve(1, deadline, [] {}, true)) return false;
     }
     age_ = 0;
     return false;

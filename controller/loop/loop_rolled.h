@@ -31,6 +31,7 @@ template <class P, int N> void loop_rolled(const Horizon<P, N>& h, const FddpSol
       for (int i = 0; i < P::nu; ++i) {
         u[i] = both(a.u[k][i], b.u[k][i]);
         for (int j = 0; j < L::nxp; ++j) u[i] -= both(a.K[k][i][j], b.K[k][i][j]) * dx[j];
+        u[i] = min(max(u[i], Pack(P::u_lo(i))), Pack(P::u_hi(i)));
       }
       P::calc(h.phase[k], knot, x, u, next, cost_k);
       for (int i = 0; i < P::nx; ++i) x[i] = next[i];
