@@ -11,7 +11,7 @@
 namespace engram {
 
 // Stands on both feet; the right hand goes to p_WT, the arm stays clear of the boxes of world.xml.
-struct TalosPole : TalosBody<tasks::TalosPole, 50> {
+struct TalosPole : TalosBody<tasks::TalosPole, 40> {
   static constexpr bool kReaches = true;
   static constexpr int kHand = Robot::kRightGripper;
   using Field = BoxField<Task>;
