@@ -1,9 +1,10 @@
 // The cost of a trajectory (xs, us) as it is rolled out without gaps, with the gains of a sweep at it, as the fast side would execute it.
 // Apart from the rollout by which the controller chooses (loop_rolled.h):
-//   J = sum_k l_k(x_k, u_k) + l_N(x_N),   u_k = us_k - K_k (x_k (-) xs_k),   x_{k+1} = f(x_k, u_k),   x_0 as expected
+//   J = sum_k l_k(x_k, u_k) + l_N(x_N),   u_k = us_k - K_k (x_k (-) xs_k) within the torque limits,   x_{k+1} = f(x_k, u_k),   x_0 as expected
 // Without gains both trajectories diverge within the horizon, and tell nothing.
 #include "bench/pole_witness.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 
@@ -59,6 +60,7 @@ class WatchedPlanner : public RecedingPlanner<Model> {
       for (int i = 0; i < P::nu; ++i) {
         u[i] = s.u[k][i];
         for (int j = 0; j < P::ndx; ++j) u[i] -= s.K[k][i][padded_index<P::Layout>(j)] * dx[padded_index<P::Layout>(j)];
+        u[i] = std::clamp<double>(u[i], P::u_lo(i), P::u_hi(i));
       }
       P::calc(h.phase[k], h.knot[k], x, u, next, cost);
       std::memcpy(x, next, sizeof x);

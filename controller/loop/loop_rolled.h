@@ -1,6 +1,6 @@
 // What trajectories cost once their gaps are closed: kLanes of them rolled out side by side, each with its own gains.
 //
-//   J = sum_k l_k(x_k, u_k) + l_N(x_N),   u_k = us_k - K_k (x_k (-) xs_k),   x_{k+1} = f(x_k, u_k)
+//   J = sum_k l_k(x_k, u_k) + l_N(x_N),   u_k = us_k - K_k (x_k (-) xs_k) within the torque limits,   x_{k+1} = f(x_k, u_k)
 #ifndef CONTROLLER_LOOP_LOOP_ROLLED_H_
 #define CONTROLLER_LOOP_LOOP_ROLLED_H_
 
