@@ -57,7 +57,7 @@ struct Power {
     greedy = alpha >= 1 - 1e-6;
     beta = greedy ? 1.0f : static_cast<float>(1 / (1 - std::fmax(alpha, 0.0)));
     whole = beta <= 64 && beta == std::floor(beta) ? static_cast<int32_t>(beta) : 0;
-    least = std::exp2(-126.0f / beta);
+    least = std::pow(2.0f, -126.0f / beta);
   }
 };
 
