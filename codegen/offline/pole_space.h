@@ -82,12 +82,7 @@ template <class C> class PoleSpace {
     return found;
   }
   // Where the hand is [m].
-  void hand(const Node& node, double (&p)[3]) const {
-    RbdData<R, double> d;
-    rbd_kinematics<R>(node.q, d);
-    const Vec3<double> at = hand_of(d);
-    for (int i = 0; i < 3; ++i) p[i] = at[i];
-  }
+  void hand(const Node& node, double (&p)[3]) const { C::hand(node.q, p); }
   // What stays of feet [m, rad] and pole [m]: the largest distance of a sole from where it stood, and the smallest of a sphere from the pole.
   void measure(const Node& node, double& feet, double& pole) const {
     RbdData<R, double> d;
@@ -122,19 +117,13 @@ template <class C> class PoleSpace {
     return sum;
   }
 
-  static Vec3<double> hand_of(const RbdData<R, double>& d) {
-    Mat3<double> R_WF;
-    Vec3<double> p;
-    rbd_frame_placement<R>(d, C::kHand, R_WF, p);
-    return p;
-  }
   static double nearest_box(const Vec3<double>& p) {
     Vec3<double> g;
     double least = HUGE_VAL;
     for (int o = 0; o < C::Field::count; ++o) least = std::min(least, C::Field::distance(o, p, g));
     return least;
   }
-  static double hand_clearance(const RbdData<R, double>& d) { return nearest_box(hand_of(d)); }
+  static double hand_clearance(const RbdData<R, double>& d) { return nearest_box(C::hand_of(d)); }
   static double clearance(const RbdData<R, double>& d) {
     double least = HUGE_VAL;
     for (int s = 0; s < Task::nsphere; ++s) least = std::min(least, nearest_box(rbd_sphere_position<R, Task>(d, s)) - Task::sphere_radius[s]);
@@ -165,7 +154,7 @@ template <class C> class PoleSpace {
     for (int i = 0; i < kReach; ++i) {
       RbdData<R, double> d;
       rbd_kinematics<R>(node.q, d);
-      const Vec3<double> at = hand_of(d), r(p[0] - at[0], p[1] - at[1], p[2] - at[2]);
+      const Vec3<double> at = C::hand_of(d), r(p[0] - at[0], p[1] - at[1], p[2] - at[2]);
       if (dot(r, r) < kHand * kHand) return stand(node);
       Mat<double, 6, R::nv> J;
       rbd_frame_jacobian<R>(d, C::kHand, at, J);

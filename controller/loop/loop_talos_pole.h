@@ -39,12 +39,16 @@ struct TalosPole : TalosBody<tasks::TalosPole, 40> {
     k.limit_margin_q = Task::reach_limit_margin;
   }
   // Where the hand is [m]: world axes.
+  static Vec3<double> hand_of(const RbdData<Robot, double>& d) {
+    Mat3<double> R_WF;
+    Vec3<double> p;
+    rbd_frame_placement<Robot>(d, kHand, R_WF, p);
+    return p;
+  }
   static void hand(const double* x, double (&p)[3]) {
     RbdData<Robot, double> d;
     rbd_kinematics<Robot>(x, d);
-    Mat3<double> R_WF;
-    Vec3<double> at;
-    rbd_frame_placement<Robot>(d, kHand, R_WF, at);
+    const Vec3<double> at = hand_of(d);
     for (int i = 0; i < 3; ++i) p[i] = at[i];
   }
   // Where hand and elbow are [m], and how the hand moves [m/s]: world axes.
@@ -52,10 +56,7 @@ struct TalosPole : TalosBody<tasks::TalosPole, 40> {
     RbdData<Robot, double> d;
     rbd_kinematics<Robot>(x, d);
     rbd_velocity<Robot>(x + Robot::nq, d);
-    Mat3<double> R_WF;
-    Vec3<double> at;
-    rbd_frame_placement<Robot>(d, kHand, R_WF, at);
-    const Vec3<double> moves = rbd_point_velocity<Robot>(d, Robot::frame_joint[kHand], at);
+    const Vec3<double> at = hand_of(d), moves = rbd_point_velocity<Robot>(d, Robot::frame_joint[kHand], at);
     for (int i = 0; i < 3; ++i) {
       p_WH[i] = at[i];
       p_WE[i] = d.p_WJ[1 + moved[kElbow]][i];

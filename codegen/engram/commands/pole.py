@@ -1,9 +1,7 @@
 """Learn the way around the pole: record guided runs of Talos, fit the memory, write its tables."""
 
 import argparse
-import hashlib
 import os
-import subprocess
 from pathlib import Path
 
 from engram.paths import BUILD, TABLES, relative
@@ -60,23 +58,16 @@ def record(runs: int, seed: int) -> Path:
 
     from tqdm import tqdm
 
-    from engram.inputs import InputError
+    from engram.data.pole_runs import run_shard, shards_folder
 
-    program = BUILD / "bin" / "engram-pole"
-    if not program.is_file():
-        raise InputError(f"no {relative(program)}; build it: TARGETS=engram-pole scripts/setup.sh")
-    folder = BUILD / "data" / "talos_pole" / hashlib.sha256(program.read_bytes()).hexdigest()[:12]
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = shards_folder(BUILD / "data" / "talos_pole")
 
     def shard(first: int) -> Path:
         many = min(SHARD, runs - first)
         path = folder / f"{seed}_{first}_{many}.bin"
         if not path.is_file():
             part = path.with_suffix(".part")
-            command = [program, f"motions={many}", f"first={first}", f"seed={seed}", "guide=1", f"record={part}"]
-            done = subprocess.run(command, cwd=BUILD.parent, capture_output=True, text=True, check=False)
-            if done.returncode != 0:
-                raise InputError(f"{relative(program)}: {done.stderr.strip() or 'failed'}")
+            run_shard(first, many, seed, "guide=1", f"record={part}")
             part.replace(path)
         return path
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
-import subprocess
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from engram.inputs import InputError
-from engram.paths import BUILD, relative
+from engram.data.pole_runs import run_shard, shards_folder
+from engram.paths import BUILD
 from engram.study.report import Report, wilson
 
 MOTIONS, QUICK = 200, 20
@@ -127,19 +125,12 @@ def run_modes(report: Report, count: int) -> dict[str, Outcome]:
 
 def shard(mode: str, first: int, many: int, *options: str) -> tuple[str, Path]:
     """What engram-pole prints of motions `first` to `first + many`, and the file of its times. Raises InputError."""
-    program = BUILD / "bin" / "engram-pole"
-    if not program.is_file():
-        raise InputError(f"no {relative(program)}; build it: TARGETS=engram-pole scripts/setup.sh")
-    folder = BUILD / "study" / "7.1" / hashlib.sha256(program.read_bytes()).hexdigest()[:12]
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = shards_folder(BUILD / "study" / "7.1")
     name = "_".join([mode, str(SEED), str(first), str(many), *(option.replace("=", "-") for option in options)])
     said, path = folder / f"{name}.txt", folder / f"{name}.bin"
     if not said.is_file():
-        command = [program, f"motions={many}", f"first={first}", f"seed={SEED}", f"memory={mode}", f"cycles={path}", *options]
-        done = subprocess.run(command, cwd=BUILD.parent, capture_output=True, text=True, check=False)
-        if done.returncode != 0:
-            raise InputError(f"{relative(program)}: {done.stderr.strip() or 'failed'}")
-        said.write_text(done.stdout, encoding="utf-8")
+        text = run_shard(first, many, SEED, f"memory={mode}", f"cycles={path}", *options)
+        said.write_text(text, encoding="utf-8")
     return said.read_text(encoding="utf-8"), path
 
 
