@@ -2,8 +2,8 @@
 //
 //   1/2 w sum_{sphere s, obstacle o} max(0, margin + r_s - d_o(p_s))^2
 //
-// A field says how many obstacles it holds and gives the signed distance to each, with its gradient: BoxField for boxes,
-// GridField for one sampled signed distance field.
+// A field says how many obstacles it holds, gives the signed distance to each, with its gradient, and tells at less cost whether one
+// is farther than some reach: BoxField for boxes, GridField for one sampled signed distance field.
 #ifndef CONTROLLER_OCP_OCP_OBSTACLES_H_
 #define CONTROLLER_OCP_OCP_OBSTACLES_H_
 
@@ -16,10 +16,15 @@ namespace engram {
 template <class W> struct BoxField {
   static constexpr int count = W::nbox;
 
+  // Whether the distance of p to box i is at least `reach` in every lane: if it is along one axis of the box.
+  template <class S> static bool far(int i, const Vec3<S>& p, S reach) {
+    const Vec3<S> c = in_box(i, p);
+    return !any(max(max(abs(c[0]) - S(W::half[i][0]), abs(c[1]) - S(W::half[i][1])), abs(c[2]) - S(W::half[i][2])) < reach);
+  }
+
   // Signed distance of p to box i, negative inside; gradient in world axes (unit length almost everywhere).
   template <class S> static S distance(int i, const Vec3<S>& p, Vec3<S>& gradient) {
-    const Mat3<S> R_WO = constant33<S>(W::R_WO[i]);
-    const Vec3<S> c = mul_transposed(R_WO, Vec3<S>(p - constant3<S>(W::p_WO[i])));
+    const Vec3<S> c = in_box(i, p);
     Vec3<S> excess, sign;  // per axis: how far beyond the face, and on which side
     for (int k = 0; k < 3; ++k) {
       sign[k] = select(c[k] < S(0.0), S(-1.0), S(1.0));
@@ -34,8 +39,13 @@ template <class W> struct BoxField {
       const S face = select(excess[k] >= deepest, S(1.0), S(0.0));
       g[k] = sign[k] * select(deepest > S(0.0), out[k] * inverse, face);
     }
-    gradient = mul(R_WO, g);
+    gradient = mul(constant33<S>(W::R_WO[i]), g);
     return select(deepest > S(0.0), outside, deepest);
+  }
+
+ private:
+  template <class S> static Vec3<S> in_box(int i, const Vec3<S>& p) {
+    return mul_transposed(constant33<S>(W::R_WO[i]), Vec3<S>(p - constant3<S>(W::p_WO[i])));
   }
 };
 
@@ -44,6 +54,7 @@ template <class W> struct BoxField {
 template <class G> struct GridField {
   static constexpr int count = 1;
 
+  template <class S> static bool far(int, const Vec3<S>&, S) { return false; }
   template <class S> static S distance(int, const Vec3<S>& p, Vec3<S>& gradient) {
     S d = 0.0;
     for (int l = 0; l < lanes_of<S>; ++l) {  // a gather: lane by lane
@@ -96,9 +107,11 @@ template <class R, class Field, class Spheres = R> struct ObstacleTerm {
     S c = 0.0;
     for (int s = 0; s < Spheres::nsphere; ++s) {
       const Vec3<S> center = rbd_sphere_position<R, Spheres>(k.d, s);
+      const S reach = p.obstacle_margin + S(Spheres::sphere_radius[s]);
       for (int o = 0; o < Field::count; ++o) {
+        if (Field::far(o, center, reach)) continue;
         Vec3<S> g;
-        const S e = max(p.obstacle_margin + S(Spheres::sphere_radius[s]) - Field::distance(o, center, g), S(0.0));
+        const S e = max(reach - Field::distance(o, center, g), S(0.0));
         c += e * e;
       }
     }
@@ -109,11 +122,15 @@ template <class R, class Field, class Spheres = R> struct ObstacleTerm {
     S c = 0.0;
     for (int s = 0; s < Spheres::nsphere; ++s) {
       const Vec3<S> center = rbd_sphere_position<R, Spheres>(k.d, s);
+      const S reach = p.obstacle_margin + S(Spheres::sphere_radius[s]);
+      bool near = false;
       Vec3<S> gradient = Vec3<S>::Zero();  // - sum_o e_o g_o
       S H[6] = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0};  // sum_o [e_o > 0] g_o g_o': xx xy xz yy yz zz
       for (int o = 0; o < Field::count; ++o) {
+        if (Field::far(o, center, reach)) continue;
+        near = true;
         Vec3<S> g;
-        const S e = max(p.obstacle_margin + S(Spheres::sphere_radius[s]) - Field::distance(o, center, g), S(0.0));
+        const S e = max(reach - Field::distance(o, center, g), S(0.0));
         const S active = select(e > S(0.0), S(1.0), S(0.0));
         c += e * e;
         gradient -= g * e;
@@ -121,7 +138,7 @@ template <class R, class Field, class Spheres = R> struct ObstacleTerm {
         for (int i = 0, n = 0; i < 3; ++i)
           for (int j = i; j < 3; ++j) H[n++] += ag[i] * g[j];
       }
-      add_point(p.obstacle_w, DofPath<R>(Spheres::sphere_joint[s]), center, gradient, H, k.d, M);
+      if (near) add_point(p.obstacle_w, DofPath<R>(Spheres::sphere_joint[s]), center, gradient, H, k.d, M);
     }
     return S(0.5) * p.obstacle_w * c;
   }

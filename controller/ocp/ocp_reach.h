@@ -76,6 +76,7 @@ template <class T, class S> S reach_clearance(const S* q) {
   for (int s = 0; s < R::nsphere; ++s) {
     const Vec3<S> center = rbd_sphere_position(d, s);
     for (int o = 0; o < T::nbox; ++o) {
+      if (BoxField<T>::far(o, center, least + S(R::sphere_radius[s]))) continue;
       Vec3<S> gradient;
       least = min(least, BoxField<T>::distance(o, center, gradient) - S(R::sphere_radius[s]));
     }

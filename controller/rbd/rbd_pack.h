@@ -2,7 +2,7 @@
 // lanes never mix.
 //
 // All of rbd and ocp is written over a scalar S that is Real or Pack, without branches on values: comparisons give masks, and
-// select(mask, a, b) picks per lane. GCC and Clang vector extensions keep this portable (AVX2, AVX-512, NEON).
+// select(mask, a, b) picks per lane. The one exception is any(mask), where all lanes may be spared what adds nothing. GCC and Clang vector extensions keep this portable (AVX2, AVX-512, NEON).
 //
 // Real is double. A program compiled with ENGRAM_SINGLE computes in float, twice as many lanes at once; it is one choice for all of a
 // program, as ENGRAM_LANES is. Robots' constants, options, times and what the loop stores stay double.
@@ -86,6 +86,18 @@ struct Pack {
 // Per lane: mask ? a : b.
 ENGRAM_INLINE Pack select(Pack::Mask mask, Pack a, Pack b) { return Pack(mask ? a.l : b.l); }
 ENGRAM_INLINE Real select(bool mask, Real a, Real b) { return mask ? a : b; }
+
+// Whether the mask holds in any lane: for work that only adds zeros where it does not. The result must be the same either way.
+ENGRAM_INLINE bool any(bool mask) { return mask; }
+ENGRAM_INLINE bool any(Pack::Mask mask) {
+#if defined(__AVX__) && ENGRAM_LANES == 4
+  const __m256i lanes = reinterpret_cast<__m256i>(mask);
+  return !_mm256_testz_si256(lanes, lanes);
+#endif
+  Bits bits = 0;
+  for (int i = 0; i < kLanes; ++i) bits |= mask[i];
+  return bits != 0;
+}
 
 template <class S> ENGRAM_INLINE S max(S a, S b) { return select(a > b, a, b); }
 template <class S> ENGRAM_INLINE S min(S a, S b) { return select(a < b, a, b); }

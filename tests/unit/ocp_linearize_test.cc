@@ -192,6 +192,26 @@ TEST(OcpObstacles, BoxDistanceHasItsGradient) {
   EXPECT_NEAR(BoxField<OneBox>::distance(0, Vec3<double>(0.1, -0.2, 0.3), g), -0.1, 1e-15);  // centre: the nearest face is z
 }
 
+// What is called far is, in every lane; and most of what is far is called so.
+TEST(OcpObstacles, FarBoxesAreFar) {
+  const Pack reach = 0.2;
+  int all_far = 0, called_far = 0;
+  for (int n = 0; n < 1000; ++n) {
+    Vec3<Pack> p, g;
+    for (int l = 0; l < kLanes; ++l)
+      for (int i = 0; i < 3; ++i) p[i].set(l, uniform());
+    const Pack d = BoxField<OneBox>::distance(0, p, g);
+    double least = HUGE_VAL;
+    for (int l = 0; l < kLanes; ++l) least = std::min(least, d[l]);
+    const bool far = BoxField<OneBox>::far(0, p, reach);
+    EXPECT_TRUE(!far || least >= 0.2 - 1e-12);
+    all_far += least >= 0.2;
+    called_far += far;
+  }
+  EXPECT_GT(called_far, all_far / 2);
+  EXPECT_GT(called_far, 0);
+}
+
 TEST(OcpObstacles, GridInterpolatesTheBox) {
   Vec3<double> g;
   for (int k = 0; k < Grid::nz; ++k)
