@@ -1,7 +1,7 @@
 """How far the guess and the first iterations at a jump are from the best known solution of the same problem.
 
 The controller writes, for each jump, the problem (state, task vector) and the merit of its guess and after each iteration. J* is
-the lowest cost among what the controller itself reached there and what converges from straight lines and detours.
+the lowest cost among what the controller itself reached there and what comes of straight lines and detours.
 """
 
 from concurrent.futures import ProcessPoolExecutor
@@ -15,6 +15,8 @@ from engram_sim.results import Run
 
 ITERATIONS = 10  # that are shown
 IK_STARTS = 22  # postures from which inverse kinematics looks for ends of lines
+LINES, DETOURS = 3, 1  # guesses of lowest merit that are solved
+SHORT, LONG, KEPT = 20, 40, 2  # iterations of each; more iterations of the cheapest two
 SMALL_CHUNK = 8
 
 
@@ -54,31 +56,30 @@ def _start(robot: str, task: str) -> None:
     from engram.data.reach import ReachSolver, Settings
     from engram.tasks.spec import load_task
 
-    _solver = ReachSolver(load_task(robot, task), 0, Settings(lines=3, detours=1, iterations=100))
+    _solver = ReachSolver(load_task(robot, task), 0, Settings())
 
 
 def best_cost(x0: np.ndarray, task: np.ndarray) -> float:
-    """Lowest converged cost of the problem from straight lines and detours by way of home; infinite if none converges."""
+    """Lowest cost without gaps that comes of straight lines and detours by way of home; infinite if all keep gaps."""
     from engram.data.reach import detour
 
-    nq = len(_solver.q_lo)
+    problem, nq = _solver.problem, len(_solver.q_lo)
     rng = np.random.default_rng(0)
     starts = np.vstack([x0[:nq], rng.uniform(_solver.q_lo, _solver.q_hi, (IK_STARTS, nq))])
     ends = _solver.ends(task, starts)
-    _solver.problem.set(x0, task)
-    guesses = []
-    if len(ends):
-        lines = _solver.problem.line(ends)
-        detours = _solver.problem.warp(detour(x0[:nq], _solver.spec.robot.q_home, ends, _solver.spec.knots), ends)
-        for (xs, us), count in ((lines, _solver.settings.lines), (detours, _solver.settings.detours)):
-            chosen = np.argsort(_solver.problem.merit(xs, us), kind="stable")[:count]
-            guesses += [(xs[i], us[i]) for i in chosen]
-    costs = [np.inf]
-    for xs, us in guesses:
-        found = _solver.problem.solve(xs, us, iterations=_solver.settings.iterations, stop=_solver.settings.stop)
-        if found["converged"]:
-            costs.append(float(found["cost"]))
-    return min(costs)
+    problem.set(x0, task)
+    if not len(ends):
+        return np.inf
+    lines = problem.line(ends)
+    detours = problem.warp(detour(x0[:nq], _solver.spec.robot.q_home, ends, _solver.spec.knots), ends)
+    found = []
+    for (xs, us), count in ((lines, LINES), (detours, DETOURS)):
+        chosen = np.argsort(problem.merit(xs, us), kind="stable")[:count]
+        found += [problem.solve(xs[i], us[i], iterations=SHORT, stop=_solver.settings.stop) for i in chosen]
+    found.sort(key=lambda f: (not f["feasible"], f["cost"]))
+    begun = [f for f in found[:KEPT] if not f["converged"]]
+    found += [problem.solve(f["xs"], f["us"], iterations=LONG, stop=_solver.settings.stop) for f in begun]
+    return min((float(f["cost"]) for f in found if f["feasible"]), default=np.inf)
 
 
 def _best_costs(problems: list[tuple[np.ndarray, np.ndarray]]) -> list[float]:
