@@ -34,21 +34,30 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
 
   explicit Rival(const engram_options& options) : solve_(options) {}
 
-  // False if there is none.
+  // Asks the memory, at every tick. What it answers is where the rival goes on from if that has the lower merit as it stands, the way out of
+  // kPatience ticks or the only one. False if there is nothing to go on from.
   template <class Extend> bool ask(const typename M::Target& target, int64_t seq, const Solve<M>& shifted, Extend extend) {
     arrived_ = M::Memory::arrived(target, shifted.horizon.x0);
     if (arrived_ || age_ >= M::Memory::kPatience) age_ = 0;
-    reg_ = age_ > 0 ? solve_.reg() : 0.0;
-    if (age_ > 0) resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, seed_, extend);
-    else if (!memory_.guess(target, seq, shifted.plan, seed_)) return false;
-    return all_finite(seed_.x[0], (N + 1) * M::P::nx) && all_finite(seed_.u[0], N * M::P::nu) ? true : (age_ = 0, false);
+    if (age_ > 0) {
+      resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, seed_, extend);
+      if (!finite(seed_)) age_ = 0;
+    }
+    const bool answered = memory_.guess(target, seq, shifted.plan, answer_) && finite(answer_);
+    if (answered && age_ > 0) {
+      Candidate<typename M::P> both[2] = {{ENGRAM_CANDIDATE_KNN, seed_.x, seed_.u, 0.0, 0.0, 0.0}, {ENGRAM_CANDIDATE_KNN, answer_.x, answer_.u, 0.0, 0.0, 0.0}};
+      loop_merit<typename M::P, N>(shifted.horizon, both, 2);
+      if (both[1].merit < both[0].merit) age_ = 0;
+    }
+    start_ = age_ > 0 ? &seed_ : &answer_;
+    return age_ > 0 || answered;
   }
   // Iterates on the horizon of the shifted plan, and judges at the sweep of the last iteration. True if it is to take that one's place.
   bool better(const Solve<M>& shifted, Deadline& deadline) {
     cost_[0] = HUGE_VAL;
     cost_[1] = shifted.merit();
     if (arrived_) {
-      Candidate<typename M::P> answer = {ENGRAM_CANDIDATE_KNN, seed_.x, seed_.u, 0.0, 0.0, 0.0};
+      Candidate<typename M::P> answer = {ENGRAM_CANDIDATE_KNN, answer_.x, answer_.u, 0.0, 0.0, 0.0};
       loop_merit<typename M::P, N>(shifted.horizon, &answer, 1);
       if (!(answer.merit < cost_[1])) {
         cost_[0] = answer.merit;
@@ -59,7 +68,7 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
     solve_.plan.n = N;
     std::memcpy(solve_.plan.utime, shifted.plan.utime, sizeof(solve_.plan.utime));
     solve_.clear();
-    solve_.start(seed_.x, seed_.u, reg_);
+    solve_.start(start_->x, start_->u, age_ > 0 ? solve_.reg() : 0.0);
     ++age_;
     if (solve_.improve(M::Memory::kIterations - 1, deadline, [] {}) && solve_.ready()) {
       if (cheaper(shifted)) return true;
@@ -84,11 +93,14 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
     return std::isfinite(cost_[0]) && !(cost_[0] >= cost_[1]);
   }
 
-  Seed<typename M::P, N> seed_;
+  static bool finite(const Seed<typename M::P, N>& s) { return all_finite(s.x[0], (N + 1) * M::P::nx) && all_finite(s.u[0], N * M::P::nu); }
+
+  Seed<typename M::P, N> seed_, answer_;  // the rival on this tick's knots; what the memory has just answered
+  const Seed<typename M::P, N>* start_ = &answer_;
   Solve<M> solve_;
   bool arrived_ = false;
   int age_ = 0;  // ticks that the trajectory has been iterated in
-  double reg_ = 0.0, cost_[2] = {HUGE_VAL, HUGE_VAL};  // of the rival, of the shifted plan
+  double cost_[2] = {HUGE_VAL, HUGE_VAL};  // of the rival, of the shifted plan
   typename M::Memory memory_;
 };
 
