@@ -85,14 +85,14 @@ template <class M> bool RecedingPlanner<M>::iterate(const Plan<P, N>& before, bo
 template <class M> void RecedingPlanner<M>::challenge(Deadline& deadline) {
   const double begin = deadline.now();
   if (jumped_) rival_.forget();
-  const bool asked = rival_.ask(task_.target, seq_, solve_, [&](int k, const double* x, double* u, double* x_next) {
-    model_.extend(solve_.horizon, k, x, u, x_next);
-  });
+  const bool asked = rival_.ask(task_.target, seq_, solve_);
   const double answered = deadline.now();
   cycle_.asked_us[ENGRAM_CANDIDATE_KNN] = answered - begin;
   cycle_.query_us += answered - begin;
   if (!asked) return;
-  const bool better = rival_.better(solve_, deadline);
+  const bool better = rival_.better(solve_, deadline, [&](int k, const double* x, double* u, double* x_next) {
+    model_.extend(solve_.horizon, k, x, u, x_next);
+  });
   cycle_.candidates_us = deadline.now() - answered;
   cycle_.guess[1] = ENGRAM_CANDIDATE_KNN;
   cycle_.merit[0] = rival_.cost_of_shifted();

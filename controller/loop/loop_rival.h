@@ -1,11 +1,12 @@
 // A rival to the shifted plan: what a memory proposes for the horizon as it is posed, improved on its own, and judged by what it costs rolled out.
 //
 // A plan that has come to rest before an obstacle stays there: its shift is a local minimum, and an iteration leaves it where it is. A rival
-// starts elsewhere. It has M::Memory::kIterations iterations of each tick for M::Memory::kPatience ticks, its trajectory shifted in between
-// as the plan's is; then the memory is asked anew. It takes the plan's place if at the last sweep of a tick it costs less than the
+// starts elsewhere. The memory is asked at every tick. The rival has M::Memory::kIterations iterations of each tick, its trajectory shifted
+// in between as the plan's is; it begins anew from the answer if that has the lower merit as it stands, and after M::Memory::kPatience ticks.
+// It takes the plan's place if at the last sweep of a tick it costs less than the
 // shifted plan, both rolled out without gaps and with the gains of a sweep at themselves (loop_rolled.h), and never otherwise: by its merit a
 // plan whose gaps are open looks good that would swing the arm into what it is stuck at. No switch_gain: waiting for a tenth less let it do so.
-// Where the robot has arrived the memory is asked at each tick, and its answer is iterated on only if as it stands it has the lower merit.
+// Where the robot has arrived, the answer is iterated on only if as it stands it has a lower merit than the shifted plan.
 // A memory has
 //
 //   static constexpr bool kRemembers;  static constexpr int kIterations, kPatience;
@@ -34,41 +35,31 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
 
   explicit Rival(const engram_options& options) : solve_(options) {}
 
-  // Asks the memory, at every tick. What it answers is where the rival goes on from if that has the lower merit as it stands, the way out of
-  // kPatience ticks or the only one. False if there is nothing to go on from.
-  template <class Extend> bool ask(const typename M::Target& target, int64_t seq, const Solve<M>& shifted, Extend extend) {
+  // Asks the memory. False if there is nothing to go on from.
+  bool ask(const typename M::Target& target, int64_t seq, const Solve<M>& shifted) {
     arrived_ = M::Memory::arrived(target, shifted.horizon.x0);
     if (arrived_ || age_ >= M::Memory::kPatience) age_ = 0;
-    if (age_ > 0) {
-      resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, seed_, extend);
-      if (!finite(seed_)) age_ = 0;
-    }
-    const bool answered = memory_.guess(target, seq, shifted.plan, answer_) && finite(answer_);
-    if (answered && age_ > 0) {
-      Candidate<typename M::P> both[2] = {{ENGRAM_CANDIDATE_KNN, seed_.x, seed_.u, 0.0, 0.0, 0.0}, {ENGRAM_CANDIDATE_KNN, answer_.x, answer_.u, 0.0, 0.0, 0.0}};
-      loop_merit<typename M::P, N>(shifted.horizon, both, 2);
-      if (both[1].merit < both[0].merit) age_ = 0;
-    }
-    start_ = age_ > 0 ? &seed_ : &answer_;
-    return age_ > 0 || answered;
+    answered_ = memory_.guess(target, seq, shifted.plan, answer_) && all_finite(answer_.x[0], (N + 1) * M::P::nx) && all_finite(answer_.u[0], N * M::P::nu);
+    return answered_ || age_ > 0;
   }
   // Iterates on the horizon of the shifted plan, and judges at the sweep of the last iteration. True if it is to take that one's place.
-  bool better(const Solve<M>& shifted, Deadline& deadline) {
+  template <class Extend> bool better(const Solve<M>& shifted, Deadline& deadline, Extend extend) {
     cost_[0] = HUGE_VAL;
     cost_[1] = shifted.merit();
     if (arrived_) {
-      Candidate<typename M::P> answer = {ENGRAM_CANDIDATE_KNN, answer_.x, answer_.u, 0.0, 0.0, 0.0};
-      loop_merit<typename M::P, N>(shifted.horizon, &answer, 1);
-      if (!(answer.merit < cost_[1])) {
-        cost_[0] = answer.merit;
-        return false;
-      }
+      cost_[0] = merits(shifted).answer;
+      if (!(cost_[0] < cost_[1])) return false;
+    } else if (age_ > 0) {
+      resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, carried_, extend);
+      const Merits as_they_stand = merits(shifted);
+      if (answered_ && !(as_they_stand.carried <= as_they_stand.answer)) age_ = 0;
     }
+    const Seed<typename M::P, N>& start = age_ > 0 ? carried_ : answer_;
     solve_.horizon = shifted.horizon;
     solve_.plan.n = N;
     std::memcpy(solve_.plan.utime, shifted.plan.utime, sizeof(solve_.plan.utime));
     solve_.clear();
-    solve_.start(start_->x, start_->u, age_ > 0 ? solve_.reg() : 0.0);
+    solve_.start(start.x, start.u, age_ > 0 ? solve_.reg() : 0.0);
     ++age_;
     if (solve_.improve(M::Memory::kIterations - 1, deadline, [] {}) && solve_.ready()) {
       if (cheaper(shifted)) return true;
@@ -93,12 +84,18 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
     return std::isfinite(cost_[0]) && !(cost_[0] >= cost_[1]);
   }
 
-  static bool finite(const Seed<typename M::P, N>& s) { return all_finite(s.x[0], (N + 1) * M::P::nx) && all_finite(s.u[0], N * M::P::nu); }
+  struct Merits {
+    double answer, carried;
+  };
+  Merits merits(const Solve<M>& shifted) const {
+    Candidate<typename M::P> both[2] = {{ENGRAM_CANDIDATE_KNN, answer_.x, answer_.u, 0.0, 0.0, 0.0}, {ENGRAM_CANDIDATE_KNN, carried_.x, carried_.u, 0.0, 0.0, 0.0}};
+    loop_merit<typename M::P, N>(shifted.horizon, both, age_ > 0 ? 2 : 1);
+    return {both[0].merit, both[1].merit};
+  }
 
-  Seed<typename M::P, N> seed_, answer_;  // the rival on this tick's knots; what the memory has just answered
-  const Seed<typename M::P, N>* start_ = &answer_;
+  Seed<typename M::P, N> answer_, carried_;  // what the memory has just answered; the rival so far, on this tick's knots
   Solve<M> solve_;
-  bool arrived_ = false;
+  bool arrived_ = false, answered_ = false;
   int age_ = 0;  // ticks that the trajectory has been iterated in
   double cost_[2] = {HUGE_VAL, HUGE_VAL};  // of the rival, of the shifted plan
   typename M::Memory memory_;

@@ -11,7 +11,7 @@ namespace engram::tasks {
 struct TalosPole {
   using Robot = robots::Talos;
   static constexpr char name[] = "talos_pole";
-  static constexpr uint64_t digest = 0xab641e467e347bab;  // of the numbers below and of the robot's
+  static constexpr uint64_t digest = 0x092449edbf0520dd;  // of the numbers below and of the robot's
 
   // task vector, in the order of task_t.value
   static constexpr int ntask = 3;
@@ -44,9 +44,9 @@ struct TalosPole {
   static constexpr double weights_limit_q = 0x1.388p+13;  // 10000
   static constexpr double weights_terminal = 0x1p+0;  // 1
   static constexpr double weights_terminal_velocity = 0x1p+0;  // 1
-  static constexpr double reach_hand = 0x1.f4p+10;  // 2000
+  static constexpr double reach_hand = 0x1.388p+12;  // 5000
   static constexpr double reach_terminal = 0x1p+2;  // 4
-  static constexpr double reach_near = 0x1.3333333333333p-3;  // 0.15
+  static constexpr double reach_near = 0x1.eb851eb851eb8p-5;  // 0.06
   static constexpr double reach_limit_margin = 0x1.47ae147ae147bp-5;  // 0.04
   static constexpr double reach_limit_v = 0x1.9p+6;  // 100
   static constexpr double reach_limit_u = 0x1.999999999999ap-4;  // 0.1

@@ -13,7 +13,7 @@ from engram.study.report import Report, wilson
 
 MOTIONS, QUICK = 200, 20
 BESIDE = 40  # of them also without memory
-SEED = 2026  # neither that of the recording nor one that weights were tuned on
+SEED = 2027  # neither that of the recording nor one that weights were tuned on: 2026 was, once its failures had been looked into
 MODES = {"memory": "with memory", "shift": "shifted plan only", "cold": "cold at the jump"}
 SHARD = 10  # motions of one process
 JOINT_SLACK = 1.0  # mrad that a joint may pass its limit by, as in the demo
