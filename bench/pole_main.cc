@@ -5,7 +5,7 @@
 // A motion: the hand is brought to a random point on one side of the pole by a guide that plans the way (`PoleGuide`; led 0: it found none),
 // then the target goes to a random point on the other side, at once or along a straight line at up to kSpeed, and the controller is on its
 // own for kAlone seconds.
-// nearest_mm, nearest_s: the smallest clearance of the arm from the pole in the second part, and when.
+// nearest_mm, nearest_s: the smallest clearance of the arm from the pole in the second part, and when; tilt_mrad: most of the base.
 // Success: the robot stands, the arm never touched the pole, and the hand is within the task's success_position over the last kRest seconds.
 // With `guide=1` the guide leads in both parts, after up to kStray seconds in which the hand may get stuck: the runs from which the memory
 // learns. record=FILE: one row of doubles per control period of the second part of a motion that succeeds (native byte order): motion,
@@ -194,7 +194,7 @@ int main(int argc, char** argv) {
     if (guided && ready && !fallen) led = guide->begin(plant.q.data(), m.to, seed + static_cast<uint64_t>(n)) == RrtResult::kFound && led;
     const int64_t start = plant.utime;
     std::vector<double> rows;
-    double worst = 0.0, over = 0.0, nearest = HUGE_VAL, nearest_at = 0.0;  // m, rad, m, s
+    double worst = 0.0, over = 0.0, nearest = HUGE_VAL, nearest_at = 0.0, tilt = 0.0;  // m, rad, m, s, rad
     int remembered = 0, asked = 0, worse = 0;  // cycles that the memory has won; answered; won though it costs no less than the shifted plan
     while (ready && plant.utime < start + static_cast<int64_t>(1e6 * kAlone) && !fallen) {
       const double t = 1e-6 * static_cast<double>(plant.utime - start);
@@ -229,14 +229,15 @@ int main(int argc, char** argv) {
       touched = touched || touches(plant, pole);
       if (const double now = clearance(plant); now < nearest) nearest = now, nearest_at = t;
       over = std::max(over, excess(plant));
+      tilt = std::max(tilt, std::acos(std::min(1.0, plant.base_up())));
       if (t > kAlone - kRest) worst = std::max(worst, distance(hand, m.to));
     }
     const bool success = ready && !fallen && !touched && worst < Task::success_position;
     if (success && log != nullptr) std::fwrite(rows.data(), sizeof(double), rows.size(), log);
     successes += success ? 1 : 0;
     ++done;
-    std::printf("motion %d side %d speed %.2f ready %d success %d led %d error_m %.4f touched %d nearest_mm %.1f nearest_s %.2f over_mrad %.2f fallen %d refused %d remembered %d asked %d worse %d hand %.3f %.3f %.3f\n", n,
-                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, led, worst, touched, 1e3 * nearest, nearest_at, 1e3 * over, fallen, refused, remembered, asked, worse, hand[0], hand[1], hand[2]);
+    std::printf("motion %d side %d speed %.2f ready %d success %d led %d error_m %.4f touched %d nearest_mm %.1f nearest_s %.2f over_mrad %.2f tilt_mrad %.0f fallen %d refused %d remembered %d asked %d worse %d hand %.3f %.3f %.3f\n", n,
+                m.to[1] > Task::p_WO[0][1] ? 1 : -1, m.speed, ready, success, led, worst, touched, 1e3 * nearest, nearest_at, 1e3 * over, 1e3 * tilt, fallen, refused, remembered, asked, worse, hand[0], hand[1], hand[2]);
     std::fflush(stdout);
   }
   if (log != nullptr) std::fclose(log);

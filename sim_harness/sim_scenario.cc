@@ -36,12 +36,24 @@ std::string take_reach(std::istringstream& line, const Model& model, Trial* tria
   std::istringstream first(t + " " + bound);
   std::vector<double> numbers;
   if (!read_numbers(first, &numbers) || !read_numbers(line, &numbers) || numbers.size() != 5) return "the form is `reach t m site x y z`";
-  trial->site = mj_name2id(model.m, mjOBJ_SITE, site.c_str());
-  if (trial->site < 0) return "the scene has no site '" + site + "'";
+  Reach reach;
+  reach.site = mj_name2id(model.m, mjOBJ_SITE, site.c_str());
+  if (reach.site < 0) return "the scene has no site '" + site + "'";
   if (numbers[0] < 0 || numbers[0] >= trial->duration || numbers[1] <= 0) return "`reach` needs a time within the episode and a positive bound";
-  trial->reach.t = numbers[0], trial->reach.bound = numbers[1];
-  std::copy(numbers.begin() + 2, numbers.end(), trial->reach.want);
+  if (!trial->reach.empty() && numbers[0] <= trial->reach.back().t) return "`reach` must come in the order of times";
+  reach.t = numbers[0], reach.bound = numbers[1];
+  std::copy(numbers.begin() + 2, numbers.end(), reach.want);
+  trial->reach.push_back(reach);
   return "";
+}
+
+// A point is to be kept until the next task sets in.
+void end_reaches(Trial* trial) {
+  for (Reach& reach : trial->reach) {
+    reach.end = trial->duration;
+    for (const TimedTask& task : trial->tasks)
+      if (task.t > reach.t) reach.end = std::min(reach.end, task.t);
+  }
 }
 
 std::string take_line(const std::string& key, std::istringstream& line, const Model& model, Trial* trial) {
@@ -98,6 +110,7 @@ std::string Scenario::read(const char* path, const Model& model) {
     if (trials.empty()) return "";
     if (trials.back().q.empty()) return fault_at(path, number, "episode `" + trials.back().name + "` has no `state`");
     if (trials.back().tasks.empty()) return fault_at(path, number, "episode `" + trials.back().name + "` has no `task`");
+    end_reaches(&trials.back());
     return "";
   };
   while (std::getline(file, text)) {
@@ -131,6 +144,12 @@ std::string Scenario::read(const char* path, const Model& model) {
 
 double TrialRecord::height_rms() const { return height_steps > 0 ? std::sqrt(height_sum / static_cast<double>(height_steps)) : 0; }
 
+int TrialRecord::reached(const Trial& trial) const {
+  int count = 0;
+  for (size_t i = 0; i < reach.size(); ++i) count += t_end - t_start > trial.reach[i].end - 2 * kHalfStep && reach[i] <= trial.reach[i].bound;
+  return count;
+}
+
 std::string Referee::reason(const Trial& trial, const TrialRecord& r) {
   std::string text;
   const auto add = [&](bool failed, const char* word) {
@@ -145,7 +164,7 @@ std::string Referee::reason(const Trial& trial, const TrialRecord& r) {
   add(trial.drift.asked() && !(r.drift <= trial.drift.bound), "drift");
   add(trial.height.asked() && !(r.height_rms() <= trial.height.bound), "height");
   add(trial.pace.asked() && !r.fallen && off_pace(), "pace");
-  add(trial.reach.asked() && !r.fallen && !(r.reach <= trial.reach.bound), "reach");
+  add(!r.fallen && r.reached(trial) < static_cast<int>(trial.reach.size()), "reach");
   add(r.touched, "touch");
   add(r.torque_share > 1 + kTorqueTolerance || r.joint_excess > kJointTolerance, "limit");
   return text.empty() ? "ok" : text;
@@ -160,6 +179,7 @@ Script::Event Referee::begin_step(double t) {
     task_ = 0;
     records_.emplace_back();
     records_.back().t_start = t;
+    records_.back().reach.assign(trial.reach.size(), 0.0);
     event.reset = &trial.q;
     event.pushes = &trial.pushes;
     return event;
@@ -198,11 +218,13 @@ void Referee::measure(const Trial& trial, const Model& model, double since, Tria
     r->height_sum += (com[2] - wanted) * (com[2] - wanted);
     ++r->height_steps;
   }
-  if (holds(trial.reach)) {
-    const mjtNum* const at = model.d->site_xpos + 3 * trial.site;
-    const double* const w = trial.reach.want;
+  for (size_t i = 0; i < trial.reach.size(); ++i) {
+    const Reach& reach = trial.reach[i];
+    if (since < reach.t - kHalfStep || since > reach.end - kHalfStep) continue;
+    const mjtNum* const at = model.d->site_xpos + 3 * reach.site;
+    const double* const w = reach.want;
     const double far = std::sqrt((at[0] - w[0]) * (at[0] - w[0]) + (at[1] - w[1]) * (at[1] - w[1]) + (at[2] - w[2]) * (at[2] - w[2]));
-    r->reach = std::max(r->reach, far);
+    r->reach[i] = std::max(r->reach[i], far);
   }
   for (int i = 0; trial.clear >= 0 && i < model.d->ncon; ++i) {
     const mjContact& c = model.d->contact[i];
@@ -258,7 +280,9 @@ void Referee::write(std::FILE* file) const {
     if (trial.drift.asked()) std::fprintf(file, ", \"com_drift_m\": %.6f", r.drift);
     if (trial.height.asked()) std::fprintf(file, ", \"com_height_rms_m\": %.6f", r.height_rms());
     if (trial.pace.asked()) std::fprintf(file, ", \"pace\": [%.4f, %.4f, %.4f]", r.pace[0], r.pace[1], r.pace[2]);
-    if (trial.reach.asked()) std::fprintf(file, ", \"reach_error_m\": %.4f", r.reach);
+    if (!trial.reach.empty())
+      std::fprintf(file, ", \"reach_error_m\": %.4f, \"reached\": %d, \"to_reach\": %zu", *std::max_element(r.reach.begin(), r.reach.end()),
+                   r.reached(trial), trial.reach.size());
     if (trial.clear >= 0) std::fprintf(file, ", \"touched\": %s", r.touched ? "true" : "false");
     std::fprintf(file, ", \"statuses\": ");
     write_statuses(file, r.statuses);

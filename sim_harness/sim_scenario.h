@@ -14,7 +14,8 @@
 //                                      + z - d (1 - cos(2 pi f s)) / 2, s: time since the last task
 //   pace t m  vx vy wz                 from t on to the end the base's mean velocity, in axes of its first heading, and its turning rate
 //                                      are these within m (m/s, rad/s)
-//   reach t m <site> x y z             from t on a site of the robot stays within m metres of this point (m, world axes)
+//   reach t m <site> x y z             from t to the next task, or to the end, a site of the robot stays within m metres of this point
+//                                      (m, world axes); may be repeated, in order of t
 //   clear <geom>                       the robot never touches this geom of the world
 //
 // Empty lines and lines that start with # are skipped. Numbers in C notation, hexadecimal floats included.
@@ -37,6 +38,12 @@ struct Demand {
   bool asked() const { return t >= 0; }
 };
 
+// A demand that holds until the next task sets in.
+struct Reach : Demand {
+  int site = -1;
+  double end = 0;  // s
+};
+
 struct TimedTask {
   double t = 0;  // s
   std::vector<double> value;
@@ -49,8 +56,8 @@ struct Trial {
   std::vector<TimedTask> tasks;  // in order of time
   std::vector<Push> pushes;
   double lowest = 0, tilt = 4;  // m, rad
-  Demand drift, height, pace, reach;
-  int site = -1;    // of `reach`
+  Demand drift, height, pace;
+  std::vector<Reach> reach;
   int clear = -1;   // geom; -1: not asked for
 };
 
@@ -72,12 +79,14 @@ struct TrialRecord {
   double height_sum = 0;   // m^2, sum of squared errors
   long height_steps = 0;
   double pace[3]{};        // m/s, rad/s
-  double reach = 0;        // m, largest distance since Demand::t
+  std::vector<double> reach;  // m, largest distance of each Reach
   bool touched = false;
   double joint_excess = 0, torque_share = 0;
   int statuses[kMaxStatus] = {};
 
   double height_rms() const;
+  // How many points were reached: those whose time has come, and whose bound was kept.
+  int reached(const Trial& trial) const;
 };
 
 // Runs a scenario and judges it.

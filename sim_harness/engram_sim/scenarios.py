@@ -108,7 +108,9 @@ def talos_pole_whole(spec: MotionSpec, seed: int, seconds: float) -> Script:
         times.append(times[-1] + STAY)
         points.append(beside_pole(spec, rng, side))
     tasks = [f"task {t} {numbers(np.array(p))}" for t, p in zip(times, points)]
-    asked = [f"reach {seconds - 0.3} {radius} right_gripper {numbers(np.array(points[-1]))}", "clear pole", "upright 0.6 0.7"]
+    ends = [*times[1:], seconds]
+    reaches = [f"reach {end - 0.3:.3f} {radius} right_gripper {numbers(np.array(p))}" for end, p in zip(ends, points)]
+    asked = [*reaches, "clear pole", "upright 0.6 0.7"]
     return scenario(spec, seed, [[f"episode whole {seconds}", home(spec, 0.0), *tasks, *asked]], "right_gripper")
 
 

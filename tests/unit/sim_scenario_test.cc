@@ -12,7 +12,7 @@ namespace engram::sim {
 namespace {
 
 constexpr char kBox[] = R"(<mujoco><worldbody><body name="trunk"><freejoint/><geom type="box" size="0.2 0.1 0.05" mass="3"/>
-  </body></worldbody></mujoco>)";
+  <site name="tip" pos="0.2 0 0"/></body></worldbody></mujoco>)";
 constexpr char kGood[] =
     "engram_scenario 1\nrobot_digest 0x12\ntask_digest 0x34\n# a comment\n"
     "episode stand 2\nstate 0 0 1 0 0 0 1\ntask 0 0.5 0.25\ntask 1 0.75 0.5\npush 0.5 0.1 trunk 10 0 0\ngust 1 0.5 trunk 0 4 0  0 0 0.2\n"
@@ -81,6 +81,8 @@ TEST_F(SimScenario, FaultsNameTheirLine) {
   EXPECT_TRUE(has(fault("upright 0.5"), ":5: `upright` needs 2 numbers"));
   EXPECT_TRUE(has(fault("upright 0.5 nan"), ":5: not a finite number"));
   EXPECT_TRUE(has(fault("drift 2 0.1"), ":5: `drift` needs a time within the episode"));
+  EXPECT_TRUE(has(fault("reach 0 0.1 nose 1 0 0"), ":5: the scene has no site 'nose'"));
+  EXPECT_TRUE(has(fault("reach 1 0.1 tip 1 0 0\nreach 0.5 0.1 tip 1 0 0"), ":6: `reach` must come in the order of times"));
   EXPECT_TRUE(has(fault("state 0 0 1"), ":5: `state` needs nq = 7 numbers"));
   EXPECT_TRUE(has(fault("task 0 2"), ":5: tasks must come in the order of their times"));
   EXPECT_TRUE(has(fault("episode f 1"), ":5: episode `f` has no `state`"));
@@ -122,6 +124,20 @@ TEST_F(SimScenario, AnEpisodeThatKeepsItsDemandsIsOk) {
   EXPECT_EQ(said, "episode 2/2 ok 1.00 s walk");
   EXPECT_NEAR(referee.records()[1].pace[0], 1.0, 1e-12);
   EXPECT_TRUE(referee.finished());
+}
+
+// Each point until the next task: what the box does afterwards is no matter, and one that is missed is told.
+TEST_F(SimScenario, EveryPointIsToBeReached) {
+  const std::string head = "engram_scenario 1\nepisode reach 2\nstate 0 0 1 0 0 0 1\ntask 0 1\ntask 1 1\nupright 0.5 0.7\n";
+  ASSERT_EQ(read(head + "reach 0.9 0.01 tip 0.2 0 1\nreach 1.9 0.01 tip 0.2 0 1.1\n" + head.substr(18)), "");
+  std::string said;
+  for (int i = 0; i <= 2000; ++i) said = show(0, i < 1000 ? 1 : 1.1);
+  EXPECT_EQ(said, "episode 1/2 ok 2.00 s reach");
+  EXPECT_EQ(referee.records()[0].reached(scenario.trials[0]), 2);
+  scenario.trials[1].reach = scenario.trials[0].reach;
+  for (int i = 0; i <= 2000; ++i) said = show(0, i < 999 ? 1 : 1.1);
+  EXPECT_EQ(said, "episode 2/2 reach 2.00 s reach");
+  EXPECT_EQ(referee.records()[1].reached(scenario.trials[1]), 1);
 }
 
 TEST_F(SimScenario, AFallEndsAnEpisode) {

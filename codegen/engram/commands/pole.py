@@ -10,7 +10,7 @@ RUNS, SEED = 330, 101
 SHARD = 10  # runs of one process
 
 EXAMPLES = """examples:
-  engram pole                      330 guided runs (8 min on two cores), tables/talos_pole/
+  engram pole                      330 guided runs (5 min on two cores), tables/talos_pole/
   engram pole --runs 20 --out /tmp/tables
   engram pole --recording runs.bin       learn from runs that were recorded before
 A change of models/talos/pole/ asks for new tables: engram task talos pole, build, engram pole, build. docs/pole.md
