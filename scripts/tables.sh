@@ -19,6 +19,7 @@ for description in models/*/*/task.toml; do
     continue
   fi
   if [ "$robot/$task" = talos/pole ]; then
+    TARGETS=engram-pole scripts/setup.sh build
     "$engram" pole
     scripts/setup.sh build
     continue
