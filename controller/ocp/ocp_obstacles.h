@@ -39,13 +39,24 @@ template <class W> struct BoxField {
       const S face = select(excess[k] >= deepest, S(1.0), S(0.0));
       g[k] = sign[k] * select(deepest > S(0.0), out[k] * inverse, face);
     }
-    gradient = mul(constant33<S>(W::R_WO[i]), g);
+    if constexpr (kAligned) gradient = g;
+    else gradient = mul(constant33<S>(W::R_WO[i]), g);
     return select(deepest > S(0.0), outside, deepest);
   }
 
  private:
+  // All boxes along the axes of the world: nothing to turn.
+  static constexpr bool kAligned = [] {
+    for (int i = 0; i < count; ++i)
+      for (int e = 0; e < 9; ++e)
+        if (W::R_WO[i][e] != (e % 4 == 0 ? 1.0 : 0.0)) return false;
+    return true;
+  }();
+  // p in the axes of box i, from its centre.
   template <class S> static Vec3<S> in_box(int i, const Vec3<S>& p) {
-    return mul_transposed(constant33<S>(W::R_WO[i]), Vec3<S>(p - constant3<S>(W::p_WO[i])));
+    const Vec3<S> from_centre = p - constant3<S>(W::p_WO[i]);
+    if constexpr (kAligned) return from_centre;
+    else return mul_transposed(constant33<S>(W::R_WO[i]), from_centre);
   }
 };
 

@@ -33,7 +33,7 @@ def add_parser(subparsers) -> argparse.ArgumentParser:
     parser.add_argument(
         "--log-full", type=float, default=10.0, help="s of the log with every state, for `engram replay` (default: 10)"
     )
-    parser.add_argument("--video", type=float, default=25.0, help="s of video; 0: none (default: 25)")
+    parser.add_argument("--video", type=float, default=20.0, help="s of video; 0: none (default: 20)")
     parser.add_argument(
         "--plant-option", action="append", default=[], metavar="OPTION=VALUE", help="for engram-plant, e.g. noise-v=0.01"
     )
