@@ -13,8 +13,7 @@ EXAMPLES = """examples:
   engram pole                      330 guided runs (5 min on two cores), tables/talos_pole/
   engram pole --runs 20 --out /tmp/tables
   engram pole --recording runs.bin       learn from runs that were recorded before
-A change of models/talos/pole/ asks for new tables: engram task talos pole, build (TARGETS=engram-pole scripts/setup.sh), engram pole,
-build.
+After a change of models/talos/pole/: engram task talos pole; TARGETS=engram-pole scripts/setup.sh; engram pole; scripts/setup.sh.
 docs/pole.md
 """
 
