@@ -3,9 +3,9 @@
 // A plan that has come to rest before an obstacle stays there: its shift is a local minimum, and an iteration leaves it where it is. A rival
 // starts elsewhere. The memory is asked at every tick. The rival has M::Memory::kIterations iterations of each tick, its trajectory shifted
 // in between as the plan's is; it begins anew from the answer if that has the lower merit as it stands, and after M::Memory::kPatience ticks.
-// It takes the plan's place if at the last sweep of a tick it costs less than the
-// shifted plan, both rolled out without gaps and with the gains of a sweep at themselves (loop_rolled.h), and never otherwise: by its merit a
-// plan whose gaps are open looks good that would swing the arm into what it is stuck at. No switch_gain: waiting for a tenth less let it do so.
+// It takes the plan's place if at the last sweep of a tick it costs less than the shifted plan, both rolled out without gaps and with the
+// gains of a sweep at themselves (loop_rolled.h), and never otherwise: by its merit a plan whose gaps are open looks good that would swing
+// the arm into what it is stuck at. No switch_gain: waiting for a tenth less let it do so.
 // Where the robot has arrived, the answer is iterated on only if as it stands it has a lower merit than the shifted plan.
 // A memory has
 //
@@ -51,8 +51,10 @@ template <class M, bool = M::Memory::kRemembers> class Rival {
       if (!(cost_[0] < cost_[1])) return false;
     } else if (age_ > 0) {
       resample(solve_.plan, shifted.plan.utime, shifted.horizon.x0, carried_, extend);
-      const Merits as_they_stand = merits(shifted);
-      if (answered_ && !(as_they_stand.carried <= as_they_stand.answer)) age_ = 0;
+      if (answered_) {
+        const Merits as_they_stand = merits(shifted);
+        if (!(as_they_stand.carried <= as_they_stand.answer)) age_ = 0;
+      }
     }
     const Seed<typename M::P, N>& start = age_ > 0 ? carried_ : answer_;
     solve_.horizon = shifted.horizon;

@@ -13,7 +13,6 @@ from engram_sim import plots
 from engram_sim.motion import Motion
 from engram_sim.report import CLOCK, CSS, html_table, ladder
 
-JOINT_SLACK = 1e-3  # rad, kJointTolerance of engram-plant
 PHASES = ("query", "linearize", "backward", "rollout", "total")
 
 
@@ -34,7 +33,7 @@ def measures(part: dict[str, Any]) -> str:
         told.append(f"arrives after {part['arrival_s']:.2f} s" if part["arrival_s"] >= 0.0 else "never there")
     if part.get("to_reach", 0) > 1:
         told.append(f"{part['reached']} of {part['to_reach']} targets reached, at most {1e3 * part['reach_error_m']:.1f} mm off")
-    if "joint_excess" in part and part["joint_excess"] > JOINT_SLACK:
+    if "limit" in part["reason"] and part.get("joint_excess", 0.0) > 0.0:
         told.append(f"a joint {1e3 * part['joint_excess']:.1f} mrad beyond its limit")
     if "tilt_max_rad" in part:
         told.append(f"tilts {np.degrees(part['tilt_max_rad']):.1f} deg")
