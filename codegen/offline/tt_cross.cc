@@ -216,7 +216,7 @@ Train tt_round(const Train& train, int rank, double tolerance) {
     out.core[k - 1] = out.core[k - 1] * R.transpose();
   }
   for (int k = 0; k + 1 < d; ++k) {  // truncated, left-orthogonal
-    const Eigen::BDCSVD<MatrixXd> svd(out.core[k], Eigen::ComputeThinU | Eigen::ComputeThinV);
+    const Eigen::JacobiSVD<MatrixXd> svd(out.core[k], Eigen::ComputeThinU | Eigen::ComputeThinV);
     const auto& sigma = svd.singularValues();
     int r = 0;
     while (r < std::min<int>(rank, int(sigma.size())) && (r == 0 || sigma[r] > tolerance * sigma[0])) ++r;

@@ -1,25 +1,25 @@
-// link: engram_talos_pole legged_plant
+// link: engram_talos_pole legged_plant random_talos_pole
 // A memory that talks nonsense does no harm: tables of random numbers with a valid digest, in closed loop; and whatever a memory says, the
 // plan that is accepted never costs more than the shifted one.
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "controller/loop/loop_controller.h"
-#include "controller/loop/loop_receding.h"
-#include "controller/loop/loop_talos_pole.h"
 #include "tables/talos_pole/tables.h"
 #include "tests/support/legged_plant.h"
 #include "tests/support/random_tables.h"
 
+extern "C" {
+TabKnn random_talos_pole_knn_v1 = talos_pole_knn_v1;
+TabPca random_talos_pole_path_v1 = talos_pole_path_v1;
+extern const engram_model random_talos_pole;
+}
+
 namespace engram::test {
 namespace {
 
-TabKnn random_knn = talos_pole_knn_v1;
-TabPca random_path = talos_pole_path_v1;
-constexpr PoleTables kRandomTables = {&random_knn, &random_path};
-using Model = LeggedModel<TalosPoleRemembers<kRandomTables>>;
-const engram_model kRandom = loop_model<Model, RecedingPlanner<Model>>("talos", "pole");
+TabKnn& random_knn = random_talos_pole_knn_v1;
+TabPca& random_path = random_talos_pole_path_v1;
 
 // Every array but the domain and the scales.
 class MakeUp : public testing::Environment {
@@ -69,7 +69,7 @@ struct Loop {
 
 // The motion that the shifted plan alone masters (legged_pole_test.cc).
 TEST(PoleAdversary, RandomTablesDoNoHarm) {
-  Loop loop(&kRandom);
+  Loop loop(&random_talos_pole);
   ASSERT_EQ(loop.controller.error, ENGRAM_NO_ERROR);
   loop.go(kRight, 2000);
   EXPECT_LT(loop.away(kRight), 0.02);

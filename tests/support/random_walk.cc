@@ -1,19 +1,19 @@
 #include "tests/support/random_walk.h"
 
-#include "controller/loop/loop_controller.h"
-#include "controller/loop/loop_receding.h"
-#include "controller/loop/loop_talos_walk.h"
 #include "tables/talos_step/tables.h"
 #include "tests/support/random_tables.h"
+
+extern "C" {
+TabGpr random_talos_step_regression_v1 = talos_step_regression_v1;
+TabPca random_talos_step_path_v1 = talos_step_path_v1, random_talos_step_torque_v1 = talos_step_torque_v1;
+extern const engram_model random_talos_walk;
+}
 
 namespace engram::test {
 namespace {
 
-TabGpr regression = talos_step_regression_v1;
-TabPca path = talos_step_path_v1, torque = talos_step_torque_v1;
-constexpr StepTables kTables = {&regression, &path, &torque};
-using Model = LeggedModel<TalosWalkRemembers<kTables>>;
-const engram_model kModel = loop_model<Model, RecedingPlanner<Model>>("talos", "walk");
+TabGpr& regression = random_talos_step_regression_v1;
+TabPca &path = random_talos_step_path_v1, &torque = random_talos_step_torque_v1;
 
 // All but the domain and the scales of the inputs.
 bool make_up() {
@@ -33,7 +33,7 @@ const engram_model* random_walk(bool valid) {
   static const bool made_up = make_up();
   for (TabHead* head : {&regression.head, &path.head, &torque.head}) RandomTables::sign(*head);
   path.head.digest ^= !valid;
-  return made_up ? &kModel : nullptr;
+  return made_up ? &random_talos_walk : nullptr;
 }
 
 }  // namespace engram::test
