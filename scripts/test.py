@@ -1,8 +1,8 @@
 """Builds and runs every test, rung by rung, and closes with one line: `N passed, N failed`.
 
 The ladder: reference, golden, closed_loop, hil, unit, fuzz (C++ by ctest, Python by pytest). The C++ tests of unit and fuzz
-run under AddressSanitizer and UndefinedBehaviorSanitizer; they come last since they compile while the other rungs run. A rung
-with fewer tests than tests/floor.txt says fails: tests must not vanish.
+run under AddressSanitizer and UndefinedBehaviorSanitizer; they compile and run in the background, beside the other rungs. A
+rung with fewer tests than tests/floor.txt says fails: tests must not vanish.
 
     scripts/test.py                    everything
     scripts/test.py unit golden        some rungs
@@ -17,6 +17,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
@@ -28,7 +29,6 @@ REPORTS = BUILD / "reports"
 FLOOR = ROOT / "tests" / "floor.txt"
 RUNGS = ("reference", "golden", "closed_loop", "hil", "unit", "fuzz")
 SANITIZED = ("unit", "fuzz")  # their programs are in build/asan/
-ALONE = ("closed_loop", "hil")  # these run two processes each that wait for one another: one test at a time
 TIMEOUT_S = 300  # of one test program: a hang fails, the ladder goes on
 
 
@@ -60,13 +60,14 @@ class Count:
 def run_ctest(rung: str, count: Count) -> None:
     """Runs the GoogleTest programs of tests/<rung>/; a program that dies without a report is one failure."""
     reports = REPORTS / rung
-    build = BUILD / "asan" if rung in SANITIZED else BUILD
     summary = reports / "ctest.xml"
-    jobs = 1 if rung in ALONE else os.cpu_count() or 1
+    build, front, jobs = BUILD, [], 1  # many of these tests are several processes that wait for one another
+    if rung in SANITIZED:
+        build, front, jobs = BUILD / "asan", ["nice"], os.cpu_count() or 1
     env = os.environ | {"GTEST_OUTPUT": f"xml:{reports}/gtest/", "UBSAN_OPTIONS": "print_stacktrace=1"}
     subprocess.run(
-        ["ctest", "--test-dir", build, "-L", f"^{rung}$", "-j", str(jobs), "--timeout", str(TIMEOUT_S), "--output-on-failure",
-         "--no-tests=ignore", "--quiet", "--output-junit", summary],
+        [*front, "ctest", "--test-dir", build, "-L", f"^{rung}$", "-j", str(jobs), "--timeout", str(TIMEOUT_S),
+         "--output-on-failure", "--no-tests=ignore", "--quiet", "--output-junit", summary],
         env=env, check=False, stdin=subprocess.DEVNULL)  # fmt: skip
     for file in sorted((reports / "gtest").glob("*.xml")):
         count.add_junit(file)
@@ -83,20 +84,14 @@ def run_ctest(rung: str, count: Count) -> None:
             count.passed += 1
 
 
-def start_pytest(rung: str) -> subprocess.Popen | None:
-    """Starts tests/<rung>/test_*.py, if there are any."""
+def run_pytest(rung: str, count: Count) -> None:
+    """Runs tests/<rung>/test_*.py, if there are any; a run that ends without a report is one failure."""
     folder = ROOT / "tests" / rung
     if not any(folder.glob("**/test_*.py")):
-        return None
+        return
     report = REPORTS / rung / "pytest.xml"
     command = [sys.executable, "-m", "pytest", "-q", "--tb=short", "--no-header", f"--junitxml={report}", folder]
-    return subprocess.Popen(command, cwd=ROOT, stdin=subprocess.DEVNULL)
-
-
-def await_pytest(rung: str, run: subprocess.Popen, count: Count) -> None:
-    """Waits for the Python tests; a run that ends without a report is one failure."""
-    status = run.wait()
-    report = REPORTS / rung / "pytest.xml"
+    status = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
     failed_before = count.failed
     if report.exists():
         count.add_junit(report)
@@ -104,35 +99,33 @@ def await_pytest(rung: str, run: subprocess.Popen, count: Count) -> None:
         count.failed += 1
 
 
-def run_rung(rung: str, count: Count, sanitized: subprocess.Popen | None) -> None:
-    """All tests of a rung, its Python tests beside its C++ tests."""
-    shutil.rmtree(REPORTS / rung, ignore_errors=True)
-    (REPORTS / rung).mkdir(parents=True)
-    if rung in ALONE:
-        run_ctest(rung, count)
-    python = start_pytest(rung)
-    if sanitized:
-        await_sanitized(sanitized, count)
-    if rung not in ALONE:
-        run_ctest(rung, count)
-    if python:
-        await_pytest(rung, python, count)
+class Sanitized(threading.Thread):
+    """The sanitized C++ tests of some rungs: compiled, then run, in the background."""
 
+    def __init__(self, rungs: list[str]) -> None:
+        super().__init__()
+        self.counts = {rung: Count() for rung in rungs}
 
-def build_sanitized() -> subprocess.Popen:
-    """Starts to compile the sanitized tests, out of the way of the rungs that run meanwhile."""
-    command = ["nice", ROOT / "scripts" / "setup.sh", "sanitized"]
-    return subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    def run(self) -> None:
+        """A build that stops is one failure of each rung."""
+        command = ["nice", ROOT / "scripts" / "setup.sh", "sanitized"]
+        build = subprocess.run(
+            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
+        )
+        if build.returncode:
+            print(build.stdout, flush=True)
+        for rung, count in self.counts.items():
+            if build.returncode:
+                count.failed += 1
+            else:
+                run_ctest(rung, count)
 
-
-def await_sanitized(build: subprocess.Popen, count: Count) -> None:
-    """Waits for the sanitized tests; a build that stops is one failure."""
-    if build.returncode is not None:
-        return  # an earlier rung has waited
-    said, _ = build.communicate()
-    if build.returncode:
-        print(said, flush=True)
-        count.failed += 1
+    def add_to(self, rung: str, count: Count) -> None:
+        """Waits for the end."""
+        self.join()
+        count.passed += self.counts[rung].passed
+        count.failed += self.counts[rung].failed
+        count.skipped += self.counts[rung].skipped
 
 
 def read_floor() -> dict[str, int]:
@@ -157,12 +150,21 @@ def main() -> int:
         parser.error(f"no rung {unknown[0]}; rungs: {' '.join(RUNGS)}")
 
     signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it; tests send it
+    for rung in rungs:
+        shutil.rmtree(REPORTS / rung, ignore_errors=True)
+        (REPORTS / rung).mkdir(parents=True)
+    sanitized = Sanitized([rung for rung in rungs if rung in SANITIZED])
+    if sanitized.counts:
+        sanitized.start()
     counts: dict[str, Count] = {}
-    sanitized = build_sanitized() if set(SANITIZED) & set(rungs) else None
     for rung in rungs:
         print(f"---- {rung} ----", flush=True)
         start, count = time.monotonic(), Count()
-        run_rung(rung, count, sanitized if rung in SANITIZED else None)
+        if rung not in SANITIZED:
+            run_ctest(rung, count)
+        run_pytest(rung, count)
+        if rung in SANITIZED:
+            sanitized.add_to(rung, count)
         count.seconds = time.monotonic() - start
         counts[rung] = count
 

@@ -1,4 +1,4 @@
-// options: -O1
+// options: -Og
 // Contacts that cannot hold end as a status, never as a number that is none. Those that can: the same bits by any number of threads.
 #include "bench/thread_pool.h"
 #include "controller/fddp/fddp_solve.h"

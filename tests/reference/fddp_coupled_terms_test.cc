@@ -1,4 +1,4 @@
-// options: -O1
+// options: -Og
 // Terms that couple q with v, or forces of several contacts, reach the sweep: its gains against a dense Riccati recursion.
 #include "codegen/offline/dense_model.h"
 #include "controller/fddp/fddp_backward.h"

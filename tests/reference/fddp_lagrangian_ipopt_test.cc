@@ -1,5 +1,5 @@
 // link: engram_offline
-// options: -O1
+// options: -Og
 // An arm under equalities and inequalities: the augmented Lagrangian's optimum against Ipopt's.
 #include "bench/problems.h"
 #include "codegen/offline/ipopt_shooting.h"

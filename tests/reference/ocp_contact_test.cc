@@ -1,5 +1,5 @@
 // Contacts and impacts: the equations of motion, every derivative against central differences, phases and lanes.
-// options: -O1
+// options: -Og
 #include "bench/legged_problems.h"
 #include "controller/fddp/fddp_solve.h"
 #include "tests/support/count_heap.h"

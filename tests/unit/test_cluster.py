@@ -118,6 +118,29 @@ def test_a_result_that_was_lost_with_its_worker_is_asked_for_again(cluster, tmp_
     assert lost and np.array_equal(found["square"], np.arange(20) ** 2)
 
 
+def test_arguments_that_were_lost_with_the_last_worker_that_held_them_are_shared_again(cluster, tmp_path, monkeypatch):
+    from distributed import Client, Future
+
+    scatter, result, shared = Client.scatter, Future.result, []
+
+    def remember(client, *arguments, **options):
+        shared.append((client, scatter(client, *arguments, **options)))
+        return shared[-1][1]
+
+    def lose_them_once(future, *arguments, **options):
+        if len(shared) == 1:
+            client, held = shared[0]
+            client.cancel(held, force=True)
+        return result(future, *arguments, **options)
+
+    monkeypatch.setattr(Client, "scatter", remember)
+    monkeypatch.setattr(Future, "result", lose_them_once)
+    mark = tmp_path / "mark"
+    mark.touch()
+    found = run(Chunks(tmp_path / "shared", "d", n=60, size=5), make_deadly_once, (mark,), 1, "squares", cluster.address)
+    assert len(shared) > 1 and np.array_equal(found["square"], np.arange(60) ** 2)
+
+
 def test_work_that_fails_is_one_message(cluster, tmp_path):
     cluster.add_worker()
     cluster.wait_for(1)

@@ -74,19 +74,29 @@ def completed(chunks: Chunks, missing: list[range], make_work, arguments: tuple,
     """Fill the missing chunks on the cluster; yields the items of each as it is written.
 
     A worker that dies loses nothing: the scheduler gives its chunks to others, and what it had done but not yet sent is asked for
-    again. Raises InputError if the cluster fails; what is written is kept.
+    again, with arguments that are shared anew: it may have held the last copy. Raises InputError if the cluster fails; what is
+    written is kept.
     """
     from distributed import as_completed
 
     client = connect(address)
     key = f"{chunks.folder.name} {chunks.key} {make_work.__qualname__}"  # what a solver depends on
+    where = relative(chunks.folder)
     try:
-        (shared,) = client.scatter([arguments], broadcast=True, hash=False)
 
-        def submit(items: range):
+        def share():
+            try:
+                return client.scatter([arguments], broadcast=True, hash=False)[0]
+            except TimeoutError:
+                raise InputError(
+                    f"--cluster: {address} has no workers left; run again to go on from what is in {where}"
+                ) from None
+
+        def submit(items: range, shared):
             return client.submit(work_on, key, make_work, shared, items, pure=False, retries=RETRIES)
 
-        futures, lost = {submit(items): items for items in missing}, Counter()
+        shared = share()
+        futures, lost = {submit(items, shared): items for items in missing}, Counter()
         running = as_completed(futures)
         for future in running:
             items = futures[future]
@@ -95,9 +105,8 @@ def completed(chunks: Chunks, missing: list[range], make_work, arguments: tuple,
             except Exception as error:  # of the work, of a worker that dies again and again, of the connection
                 lost[items] += 1
                 if not isinstance(error, CancelledError) or lost[items] > RETRIES:
-                    where = relative(chunks.folder)
                     raise InputError(f"--cluster: {_text(error)}; run again to go on from what is in {where}") from None
-                again = submit(items)
+                again = submit(items, share())
                 futures[again] = items
                 running.add(again)
                 continue
