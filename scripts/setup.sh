@@ -80,18 +80,27 @@ apt_install() {
     fail "apt-get install failed, see $log" "as root: apt-get update && apt-get install ${missing[*]}"
 }
 
-setup_python() {
-  local python stamp log=build/logs/pip.log
+# The environment as far as a build needs it.
+setup_venv() {
+  local python log=build/logs/pip.log
   python=$(find_python)
+  venv_stamp=$(content_hash requirements.txt requirements-peers.txt <("$python" -VV; echo "$PWD"))
+  [ "$(cat .venv/venv.stamp 2> /dev/null)" != "$venv_stamp" ] || return 0
   mkdir -p build/logs
-  stamp=$(content_hash requirements.txt requirements-peers.txt <("$python" -VV; echo "$PWD"))
-  if [ "$(cat .venv/stamp 2> /dev/null)" = "$stamp" ]; then
+  say python "creating .venv from pinned versions (1 to 3 minutes)"
+  "$python" -m venv --clear .venv > "$log" 2>&1 || fail "could not create .venv, see $log" "apt-get install python3-venv"
+  pip_install --only-binary :all: "$(grep nanobind requirements.txt)"
+  echo "$venv_stamp" > .venv/venv.stamp
+}
+
+setup_python() {
+  local stamp
+  setup_venv
+  if [ "$(cat .venv/stamp 2> /dev/null)" = "$venv_stamp" ]; then
     say python "environment .venv is up to date"
   else
-    say python "creating .venv from pinned versions (1 to 3 minutes)"
-    "$python" -m venv --clear .venv > "$log" 2>&1 || fail "could not create .venv, see $log" "apt-get install python3-venv"
     pip_install --only-binary :all: -r requirements.txt -r requirements-peers.txt
-    echo "$stamp" > .venv/stamp
+    echo "$venv_stamp" > .venv/stamp
   fi
   stamp=$(content_hash requirements-cluster.txt)
   if [ "$(cat .venv/cluster.stamp 2> /dev/null)" != "$stamp" ]; then
@@ -117,6 +126,16 @@ setup_build() {
   say build "building into build/ (minutes the first time, seconds after that)"
   # shellcheck disable=SC2086: a list of targets
   compile build ${TARGETS:-all}
+}
+
+# What the build does not need of the environment is installed meanwhile.
+setup_python_and_build() {
+  setup_venv
+  setup_python &
+  local python=$!
+  trap wait EXIT  # whatever stops the build, no pip is left behind
+  setup_build
+  wait "$python" || exit 1  # it has said why
 }
 
 # The unit and fuzz tests under AddressSanitizer and UndefinedBehaviorSanitizer.
@@ -150,10 +169,10 @@ setup_network() {
   fi
 }
 
-[ $# -gt 0 ] || set -- packages python build scene network
+[ $# -gt 0 ] || set -- packages python_and_build scene network
 for step in "$@"; do
   case $step in
-    packages | python | build | sanitized | scene | network | torch) "setup_$step" ;;
+    packages | python | build | python_and_build | sanitized | scene | network | torch) "setup_$step" ;;
     *) fail "unknown step $step" "steps: packages python build sanitized scene network torch" ;;
   esac
 done

@@ -1,7 +1,7 @@
 """Builds and runs every test, rung by rung, and closes with one line: `N passed, N failed`.
 
-The ladder: reference, golden, closed_loop, hil, unit, fuzz (C++ by ctest, Python by pytest). The C++ tests of unit and fuzz
-run under AddressSanitizer and UndefinedBehaviorSanitizer; they compile and run in the background, beside the other rungs. A
+The ladder: reference, golden, closed_loop, hil, unit, fuzz (C++ by ctest, Python by pytest). Unit and fuzz run in the
+background, beside the other rungs: their C++ tests are compiled first, with AddressSanitizer and UndefinedBehaviorSanitizer. A
 rung with fewer tests than tests/floor.txt says fails: tests must not vanish.
 
     scripts/test.py                    everything
@@ -28,7 +28,7 @@ BUILD = ROOT / "build"
 REPORTS = BUILD / "reports"
 FLOOR = ROOT / "tests" / "floor.txt"
 RUNGS = ("reference", "golden", "closed_loop", "hil", "unit", "fuzz")
-SANITIZED = ("unit", "fuzz")  # their programs are in build/asan/
+BACKGROUND = ("unit", "fuzz")  # their programs are in build/asan/
 TIMEOUT_S = 300  # of one test program: a hang fails, the ladder goes on
 
 
@@ -61,9 +61,10 @@ def run_ctest(rung: str, count: Count) -> None:
     """Runs the GoogleTest programs of tests/<rung>/; a program that dies without a report is one failure."""
     reports = REPORTS / rung
     summary = reports / "ctest.xml"
-    build, front, jobs = BUILD, [], 1  # many of these tests are several processes that wait for one another
-    if rung in SANITIZED:
-        build, front, jobs = BUILD / "asan", ["nice"], os.cpu_count() or 1
+    background = rung in BACKGROUND
+    build = BUILD / "asan" if background else BUILD
+    front = ["nice"] if background else []
+    jobs = os.cpu_count() or 1 if background else 1  # others are several processes that wait for one another
     env = os.environ | {"GTEST_OUTPUT": f"xml:{reports}/gtest/", "UBSAN_OPTIONS": "print_stacktrace=1"}
     subprocess.run(
         [*front, "ctest", "--test-dir", build, "-L", f"^{rung}$", "-j", str(jobs), "--timeout", str(TIMEOUT_S),
@@ -90,42 +91,39 @@ def run_pytest(rung: str, count: Count) -> None:
     if not any(folder.glob("**/test_*.py")):
         return
     report = REPORTS / rung / "pytest.xml"
-    command = [sys.executable, "-m", "pytest", "-q", "--tb=short", "--no-header", f"--junitxml={report}", folder]
-    status = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, check=False).returncode
+    front, said = (["nice"], subprocess.PIPE) if rung in BACKGROUND else ([], None)
+    command = [*front, sys.executable, "-m", "pytest", "-q", "--tb=short", "--no-header", f"--junitxml={report}", folder]
+    run = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=said, text=True, check=False)
+    if said:
+        print(run.stdout, end="", flush=True)
     failed_before = count.failed
     if report.exists():
         count.add_junit(report)
-    if status not in (0, 5) and count.failed == failed_before:
+    if run.returncode not in (0, 5) and count.failed == failed_before:
         count.failed += 1
 
 
-class Sanitized(threading.Thread):
-    """The sanitized C++ tests of some rungs: compiled, then run, in the background."""
+def run_rung(rung: str, counts: dict[str, Count]) -> None:
+    """All tests of a rung."""
+    start, count = time.monotonic(), counts[rung]
+    if rung not in BACKGROUND:
+        print(f"---- {rung} ----", flush=True)
+    run_ctest(rung, count)
+    run_pytest(rung, count)
+    count.seconds = time.monotonic() - start
 
-    def __init__(self, rungs: list[str]) -> None:
-        super().__init__()
-        self.counts = {rung: Count() for rung in rungs}
 
-    def run(self) -> None:
-        """A build that stops is one failure of each rung."""
-        command = ["nice", ROOT / "scripts" / "setup.sh", "sanitized"]
-        build = subprocess.run(
-            command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
-        )
+def run_background(rungs: list[str], counts: dict[str, Count]) -> None:
+    """Rungs with sanitized programs; a build that stops is one failure of each."""
+    command, pipe = ["nice", ROOT / "scripts" / "setup.sh", "sanitized"], subprocess.PIPE
+    build = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=pipe, stderr=subprocess.STDOUT, text=True, check=False)
+    if build.returncode:
+        print(build.stdout, flush=True)
+    for rung in rungs:
         if build.returncode:
-            print(build.stdout, flush=True)
-        for rung, count in self.counts.items():
-            if build.returncode:
-                count.failed += 1
-            else:
-                run_ctest(rung, count)
-
-    def add_to(self, rung: str, count: Count) -> None:
-        """Waits for the end."""
-        self.join()
-        count.passed += self.counts[rung].passed
-        count.failed += self.counts[rung].failed
-        count.skipped += self.counts[rung].skipped
+            counts[rung].failed += 1
+        else:
+            run_rung(rung, counts)
 
 
 def read_floor() -> dict[str, int]:
@@ -153,20 +151,17 @@ def main() -> int:
     for rung in rungs:
         shutil.rmtree(REPORTS / rung, ignore_errors=True)
         (REPORTS / rung).mkdir(parents=True)
-    sanitized = Sanitized([rung for rung in rungs if rung in SANITIZED])
-    if sanitized.counts:
-        sanitized.start()
-    counts: dict[str, Count] = {}
+    counts = {rung: Count() for rung in rungs}
+    behind = [rung for rung in rungs if rung in BACKGROUND]
+    background = threading.Thread(target=run_background, args=(behind, counts))
+    if behind:
+        background.start()
     for rung in rungs:
-        print(f"---- {rung} ----", flush=True)
-        start, count = time.monotonic(), Count()
-        if rung not in SANITIZED:
-            run_ctest(rung, count)
-        run_pytest(rung, count)
-        if rung in SANITIZED:
-            sanitized.add_to(rung, count)
-        count.seconds = time.monotonic() - start
-        counts[rung] = count
+        if rung not in BACKGROUND:
+            run_rung(rung, counts)
+    if behind:
+        print(f"---- {', '.join(behind)} ----", flush=True)
+        background.join()
 
     floor = read_floor()
     print(f"\n{'rung':<12}{'passed':>8}{'failed':>8}{'skipped':>8}{'floor':>8}{'seconds':>9}")

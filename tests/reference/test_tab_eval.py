@@ -1,4 +1,4 @@
-"""Tables emitted, compiled as C and evaluated by controller/tab, against numpy and scikit-learn."""
+"""Tables emitted, compiled as C and evaluated by the deployed archive of controller/tab, against numpy and scikit-learn."""
 
 from __future__ import annotations
 
@@ -84,11 +84,10 @@ class Tables:
             subprocess.run(
                 ["cc", "-std=c11", "-pedantic", *flags, f"-I{self.folder}", "-c", source, "-o", objects[-1]], check=True
             )
-        for source in sorted((ROOT / "controller/tab").glob("*.cc")):
-            objects.append(folder / f"{source.name}.o")
-            subprocess.run(["c++", "-std=c++17", "-fno-exceptions", *flags, "-c", source, "-o", objects[-1]], check=True)
-        library = folder / "tables.so"
-        subprocess.run(["c++", "-shared", "-o", library, *objects], check=True)
+        library, whole = folder / "tables.so", "-Wl,--whole-archive"
+        subprocess.run(
+            ["c++", "-shared", "-o", library, *objects, whole, ROOT / "build/controller/tab/libengram_tab.a"], check=True
+        )
         self.lib = ctypes.CDLL(str(library))
         self.lib.tab_digest.restype = ctypes.c_uint64
 
@@ -123,17 +122,14 @@ def test_knn_equals_brute_force(tables: Tables) -> None:
     k = 10
     exact, _ = NearestNeighbors(n_neighbors=k, algorithm="brute").fit(tables.x * tables.scale).kneighbors(queries * tables.scale)
     tolerance = (D + 2) * ULP + 4 * ULP  # stated bound of the sum, plus rounding of query and samples relative to their size
-    outside = 0
-    for query, reference in zip(queries, exact):
-        status, index, d2 = tables.knn(query, k)
-        outside += status == OUTSIDE
-        assert len(set(index.tolist())) == k and np.all(np.diff(d2) >= 0)
-        # inputs are of order 3 after scaling: their rounding enters the distance absolutely
-        np.testing.assert_allclose(np.sqrt(d2), reference, rtol=tolerance, atol=3 * np.sqrt(D) * 2 * ULP)
-        own = np.linalg.norm((tables.x[index] - query) * tables.scale, axis=1)
-        np.testing.assert_allclose(own, reference, rtol=tolerance, atol=3 * np.sqrt(D) * 2 * ULP)
+    status, index, d2 = (np.array(found) for found in zip(*(tables.knn(query, k) for query in queries)))
+    assert np.all(np.diff(np.sort(index)) > 0) and np.all(np.diff(d2) >= 0)
+    # inputs are of order 3 after scaling: their rounding enters the distance absolutely
+    np.testing.assert_allclose(np.sqrt(d2), exact, rtol=tolerance, atol=3 * np.sqrt(D) * 2 * ULP)
+    own = np.linalg.norm((tables.x[index] - queries[:, None]) * tables.scale, axis=2)
+    np.testing.assert_allclose(own, exact, rtol=tolerance, atol=3 * np.sqrt(D) * 2 * ULP)
     inside = np.all((queries >= tables.x.min(0)) & (queries <= tables.x.max(0)), axis=1)
-    assert outside == QUERIES - inside.sum()
+    assert np.sum(status == OUTSIDE) == QUERIES - inside.sum()
 
 
 def test_knn_finds_itself_at_distance_zero(tables: Tables) -> None:
