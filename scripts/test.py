@@ -17,10 +17,10 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 import xml.etree.ElementTree as ElementTree
-from dataclasses import dataclass
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import astuple, dataclass
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,12 +34,15 @@ TIMEOUT_S = 300  # of one test program: a hang fails, the ladder goes on
 
 @dataclass
 class Count:
-    """Outcome of one rung."""
+    """Outcome of tests."""
 
     passed: int = 0
     failed: int = 0
     skipped: int = 0
     seconds: float = 0.0
+
+    def __add__(self, other: Count) -> Count:
+        return Count(*(mine + theirs for mine, theirs in zip(astuple(self), astuple(other), strict=True)))
 
     @property
     def ran(self) -> int:
@@ -57,8 +60,9 @@ class Count:
                 self.passed += 1
 
 
-def run_ctest(rung: str, count: Count) -> None:
+def run_ctest(rung: str) -> Count:
     """Runs the GoogleTest programs of tests/<rung>/; a program that dies without a report is one failure."""
+    start, count = time.monotonic(), Count()
     reports = REPORTS / rung
     summary = reports / "ctest.xml"
     background = rung in BACKGROUND
@@ -83,47 +87,38 @@ def run_ctest(rung: str, count: Count) -> None:
             count.failed += 1
         elif program.get("status") != "fail" and not report.exists():
             count.passed += 1
+    count.seconds = time.monotonic() - start
+    return count
 
 
-def run_pytest(rung: str, count: Count) -> None:
+def run_pytest(rung: str) -> Count:
     """Runs tests/<rung>/test_*.py, if there are any; a run that ends without a report is one failure."""
+    start, count = time.monotonic(), Count()
     folder = ROOT / "tests" / rung
     if not any(folder.glob("**/test_*.py")):
-        return
+        return count
     report = REPORTS / rung / "pytest.xml"
     front, said = (["nice"], subprocess.PIPE) if rung in BACKGROUND else ([], None)
     command = [*front, sys.executable, "-m", "pytest", "-q", "--tb=short", "--no-header", f"--junitxml={report}", folder]
     run = subprocess.run(command, cwd=ROOT, stdin=subprocess.DEVNULL, stdout=said, text=True, check=False)
-    if said:
+    if run.returncode and said:
         print(run.stdout, end="", flush=True)
-    failed_before = count.failed
     if report.exists():
         count.add_junit(report)
-    if run.returncode not in (0, 5) and count.failed == failed_before:
-        count.failed += 1
-
-
-def run_rung(rung: str, counts: dict[str, Count]) -> None:
-    """All tests of a rung."""
-    start, count = time.monotonic(), counts[rung]
-    if rung not in BACKGROUND:
-        print(f"---- {rung} ----", flush=True)
-    run_ctest(rung, count)
-    run_pytest(rung, count)
+    if run.returncode not in (0, 5) and not count.failed:
+        count.failed = 1
     count.seconds = time.monotonic() - start
+    return count
 
 
-def run_background(rungs: list[str], counts: dict[str, Count]) -> None:
-    """Rungs with sanitized programs; a build that stops is one failure of each."""
+def run_sanitized(rungs: list[str]) -> dict[str, Count]:
+    """Compiles the programs of the rungs in the background, and runs them; a build that stops is one failure of each rung."""
     command, pipe = ["nice", ROOT / "scripts" / "setup.sh", "sanitized"], subprocess.PIPE
     build = subprocess.run(command, stdin=subprocess.DEVNULL, stdout=pipe, stderr=subprocess.STDOUT, text=True, check=False)
     if build.returncode:
         print(build.stdout, flush=True)
-    for rung in rungs:
-        if build.returncode:
-            counts[rung].failed += 1
-        else:
-            run_rung(rung, counts)
+        return {rung: Count(failed=1) for rung in rungs}
+    return {rung: run_ctest(rung) for rung in rungs}
 
 
 def read_floor() -> dict[str, int]:
@@ -151,17 +146,17 @@ def main() -> int:
     for rung in rungs:
         shutil.rmtree(REPORTS / rung, ignore_errors=True)
         (REPORTS / rung).mkdir(parents=True)
-    counts = {rung: Count() for rung in rungs}
+    counts = {}
     behind = [rung for rung in rungs if rung in BACKGROUND]
-    background = threading.Thread(target=run_background, args=(behind, counts))
-    if behind:
-        background.start()
-    for rung in rungs:
-        if rung not in BACKGROUND:
-            run_rung(rung, counts)
-    if behind:
-        print(f"---- {', '.join(behind)} ----", flush=True)
-        background.join()
+    with ThreadPoolExecutor() as pool:
+        sanitized = pool.submit(run_sanitized, behind) if behind else None
+        python = {rung: pool.submit(run_pytest, rung) for rung in behind}
+        for rung in rungs:
+            print(f"---- {rung} ----", flush=True)
+            if rung in BACKGROUND:
+                counts[rung] = sanitized.result()[rung] + python[rung].result()
+            else:
+                counts[rung] = run_ctest(rung) + run_pytest(rung)
 
     floor = read_floor()
     print(f"\n{'rung':<12}{'passed':>8}{'failed':>8}{'skipped':>8}{'floor':>8}{'seconds':>9}")

@@ -84,10 +84,9 @@ class Tables:
             subprocess.run(
                 ["cc", "-std=c11", "-pedantic", *flags, f"-I{self.folder}", "-c", source, "-o", objects[-1]], check=True
             )
-        library, whole = folder / "tables.so", "-Wl,--whole-archive"
-        subprocess.run(
-            ["c++", "-shared", "-o", library, *objects, whole, ROOT / "build/controller/tab/libengram_tab.a"], check=True
-        )
+        library, archive = folder / "tables.so", ROOT / "build/controller/tab/libengram_tab.a"
+        whole = ["-Wl,--whole-archive", archive, "-Wl,--no-whole-archive"]
+        subprocess.run(["c++", "-shared", "-o", library, *objects, *whole], check=True)
         self.lib = ctypes.CDLL(str(library))
         self.lib.tab_digest.restype = ctypes.c_uint64
 
