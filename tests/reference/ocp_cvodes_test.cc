@@ -1,6 +1,6 @@
 // link: engram_cvodes
-// The discrete step of every kind of problem against the exact flow (CVODES, tolerances 1e-12): semi-implicit Euler is of order 1, so
 // options: -Og
+// The discrete step of every kind of problem against the exact flow (CVODES, tolerances 1e-12): semi-implicit Euler is of order 1, so
 // the error of one step, in the state, in A and in B, falls by 4 when the step is halved.
 #include "bench/legged_problems.h"
 #include "bench/problems.h"
